@@ -37,6 +37,7 @@ METAL = "materials::bxdfs::conductor::tests::"
 NOISE = "materials::texture::noise::tests::"
 STRIPES = "materials::texture::stripes::tests::"
 PLASTIC = "materials::bxdfs::plastic::tests::"
+FACTS = "formats::mitsuba::tests::facts::"
 PRINCIPLED = "materials::bxdfs::principled::tests::"
 COATED = "materials::bxdfs::coated::tests::"
 FROSTED = "closed_forms::frosted::"
@@ -47,9 +48,35 @@ DIRECT = "direct::"
 PICKS = "direct::light_tree::"
 SKY = "lights::infinite::sky::tests::"
 SUBDIVISION = "assets::mesh::subdivide::tests::"
+PBRT = "formats::pbrt::"
+PBRT_FACTS = "formats::pbrt::tests::facts::"
 
 # Fault, file, the code around the expression in ⟦⟧, its replacement, and the test that must fail.
 FAULTS = [
+    ("rows at the poles read as centered rows", "lights/infinite/environment_map.rs", "Self::Poles if rows > 1 => (⟦rows as f32 - 1.0⟧, 1.0),", "rows as f32",
+     "lights::infinite::environment::tests::rows_at_the_poles_are_interpolated_exactly"),
+    ("linear bases without interreflection", "materials/bxdfs/plastic/mod.rs", "if is_linear { diffuse / ⟦(1.0 - returned)⟧ } else", "1.0",
+     PLASTIC + "linear_bases_scale_the_white_base"),
+    ("fields of view along y", "formats/mitsuba/settings.rs", "\"x\" => ⟦half / aspect⟧,", "half",
+     FACTS + "field_of_view_is_along_x"),
+    ("depth limits that are not converted", "formats/mitsuba/settings.rs", "(⟦depth - 1⟧).clamp(0, 10_000)", "depth",
+     FACTS + "depth_limits_count_vertices"),
+    ("images that are not flipped", "formats/mitsuba/textures.rs", "return Self { rows: [first, ⟦flipped⟧], offset", "second",
+     FACTS + "images_start_at_the_top_row"),
+    ("checkerboards that are not swapped", "formats/mitsuba/textures.rs", "TextureUse::Number => ⟦colors.reverse()⟧,", "{}",
+     FACTS + "checkerboards_swap_colors_as_numbers"),
+    ("flat emission spectra that are white", "formats/mitsuba/colors.rs", "ColorRole::Emission => ⟦flat_emission_color() * *value⟧,", "DVec3::splat(*value)",
+     FACTS + "flat_emission_spectra_are_purple"),
+    ("roughness that is α", "formats/mitsuba/bsdfs/surfaces.rs", "shorten_number(⟦libm::sqrt(alpha.clamp(1e-4, 1.0))⟧).into(),\n            NumberSource::Texture(texture) => match self.roughness_texture", "alpha",
+     FACTS + "roughness_is_the_root_of_alpha"),
+    ("reflectances of plastic that are copied", "formats/mitsuba/plastic.rs", "if remapped.is_finite() { ⟦remapped.clamp(0.0, 1.0)⟧ } else", "kd",
+     FACTS + "plastic_is_linear_by_default"),
+    ("environment maps that are not turned", "formats/mitsuba/emitters.rs", "linear_part(&matrix) * ⟦half_turn⟧);", "DMat3::IDENTITY",
+     FACTS + "environment_maps_start_at_minus_z"),
+    ("mirrored rectangles whose front is reversed", "formats/mitsuba/shapes.rs", "let is_reversed = ⟦is_mirroring(&matrix) != is_flipped⟧;\n        let uv = UvConvention { flips_u: is_reversed", "is_flipped",
+     FACTS + "mirrored_rectangles_keep_their_front"),
+    ("offsets of serialized meshes with 8 bytes in version 3", "assets/mesh/serialized.rs", "let offset_bytes = if ⟦version == 3⟧ { 4 } else { 8 };", "false",
+     "assets::mesh::serialized::tests::parts_of_all_versions_are_found"),
     ("panoramas with half the range of elevations", "world/camera.rs", "sin_cos_f64(⟦FRAC_PI_2⟧ * place.y);", "0.5 * FRAC_PI_2",
      PROJECTIONS + "panorama_directions_match_environment_maps"),
     ("fisheyes that are linear in the sine of the angle", "world/camera.rs", "sin_cos_f64(⟦radius.min(1.0) * half_fov⟧);", "(radius.min(1.0) * half_fov.min(1.0)).asin()",
@@ -488,6 +515,37 @@ FAULTS = [
      "models::physical_mtl_matches_principled_material"),
     ("metals in MTL files that are isotropic", "assets/mesh/mtl/material.rs", "let anisotropy = if ⟦physical.is_metal()⟧ {", "false",
      "assets::mesh::mtl::tests::pbr_statements_are_converted"),
+    ("images of pbrt cameras that are not mirrored", "formats/pbrt/settings.rs", "if ⟦!is_mirroring(&matrix)⟧ {", "false",
+     PBRT_FACTS + "left_handed_cameras_mirror_the_image"),
+    ("fields of view along the height", "formats/pbrt/settings.rs", "libm::tan(fov.to_radians() * 0.5) * ⟦height⟧ * 0.5;", "2.0",
+     PBRT_FACTS + "field_of_view_is_along_the_shorter_side"),
+    ("exposure without the shutter", "formats/pbrt/settings.rs", "film.gain * ⟦exposure⟧;", "1.0",
+     PBRT_FACTS + "iso_and_shutter_become_gain"),
+    ("roughness that is never remapped", "formats/pbrt/materials.rs", "Some(if ⟦is_remapped⟧ {", "false",
+     PBRT_FACTS + "roughness_is_remapped_by_default"),
+    ("metals under coats as in air", "formats/pbrt/materials.rs", "TextureNode::Constant(DVec3::splat(⟦1.0 / coat_ior⟧))", "1.0",
+     PBRT_FACTS + "conductors_are_copper_by_default"),
+    ("spectra of lights that keep their luminance", "formats/pbrt/colors.rs", "xyz_to_linear_rgb(xyz / ⟦xyz.y⟧)", "1.0",
+     PBRT + "colors::tests::emission_has_unit_luminance_unless_rgb"),
+    ("fronts of meshes that ignore the normals", "formats/pbrt/meshes.rs", "⟦self.area_vector(triangle).dot(sum) < 0.0⟧", "is_reversed",
+     PBRT_FACTS + "fronts_of_emissive_meshes_follow_pbrt"),
+    ("disks that ReverseOrientation does not turn", "formats/pbrt/shapes.rs", "let normal = if ⟦placement.is_reversed⟧ {", "false",
+     PBRT_FACTS + "only_reverse_orientation_turns_spheres"),
+    ("power of a whole mesh", "formats/pbrt/emitters.rs", "/ ⟦areas.len().max(1) as f64⟧;", "1.0",
+     PBRT_FACTS + "power_of_area_lights_is_per_triangle"),
+    ("two checker cells per unit", "formats/pbrt/textures.rs", "push_mapping(&mut keys, mapping, ⟦2.0⟧);", "1.0",
+     PBRT_FACTS + "checker_cells_are_one_unit"),
+    ("linear numbers of images", "formats/pbrt/textures.rs", "let is_integer = ⟦!has_float_extension(&image.file.text)⟧;", "false",
+     PBRT_FACTS + "numbers_of_images_decode_from_srgb"),
+    ("reliefs of one unit", "formats/pbrt/bake.rs", "sign * ⟦image.factor.x⟧)", "1.0",
+     PBRT_FACTS + "displacement_keeps_its_scale"),
+    ("lower half of equal-area maps turned", "formats/pbrt/environment.rs", "(u, v) = ⟦(1.0 - v, 1.0 - u)⟧;", "(1.0 - u, 1.0 - v)",
+     PBRT + "environment::tests::square_mapping_is_inverted"),
+    ("small bright sources sampled coarsely", "formats/pbrt/environment.rs", "let radiance = if ⟦has_contrast(column, row)⟧ {", "false",
+     PBRT + "environment::tests::small_sources_keep_their_power"),
+    ("paths relative to the included file", "formats/pbrt/parser/mod.rs", "let path = ⟦self.folder.join(&name.text)⟧;",
+     "self.open_files[self.open_files.len() - 1].with_file_name(&name.text)",
+     PBRT_FACTS + "included_paths_are_relative_to_the_first_file"),
 ]
 
 

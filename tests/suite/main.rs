@@ -33,6 +33,7 @@ mod once;
 mod options;
 mod output;
 mod parts;
+mod pbrt;
 mod rewritten_parts;
 mod same_bits;
 mod schema;

@@ -2,6 +2,7 @@
 
 mod bench;
 pub(crate) mod candidates;
+mod foreign;
 #[cfg(test)]
 mod help_tests;
 mod parsers;
@@ -14,6 +15,7 @@ use clap::Parser;
 use clap::builder::styling::{AnsiColor, Styles};
 
 pub use self::bench::BenchArgs;
+pub use self::foreign::ForeignArgs;
 use self::parsers::{choice_long_help, choice_parser, parse_nonnegative_number};
 pub use self::parts::{ClusterScheduler, FarmArgs, MergeArgs};
 pub use self::render::RenderArgs;
@@ -31,6 +33,7 @@ pub(super) const EXAMPLES: &str = "  \
   glimt check ball.toml                   report errors without rendering
   glimt explain materials.metal.roughness describe a key
   glimt helmet.glb                        view a model: obj, off, ply, stl, gltf
+  glimt kitchen.xml -D spp=64             render a scene of Mitsuba
   glimt helmet.glb --once --turntable 36 -o helmet.gif
   glimt import helmet.glb -o helmet.toml  convert it to an editable scene
   glimt compare a.exr reference.exr       measure the error of an image
@@ -110,7 +113,7 @@ pub enum Subcommand {
     /// Validate a scene and its files without rendering
     Check {
         /// The scene file
-        #[arg(add = candidates::scene_completer())]
+        #[arg(add = candidates::any_scene_completer())]
         scene: PathBuf,
         /// Override a scene key
         #[arg(long = "set", add = candidates::key_assignment_completer(), value_name = "TABLE.KEY=VALUE")]
@@ -118,6 +121,9 @@ pub enum Subcommand {
         /// Print errors and warnings as one JSON object on stdout
         #[arg(long)]
         json: bool,
+        /// Options for the scenes of other renderers.
+        #[command(flatten)]
+        foreign: ForeignArgs,
         /// Colors: auto, truecolor, 256, 16, none
         #[arg(long, value_parser = choice_parser::<ColorDepthChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorDepthChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW")]
         color: ColorDepthChoice,
@@ -130,7 +136,7 @@ pub enum Subcommand {
         #[arg(long)]
         schema: bool,
     },
-    /// Convert a glTF file to a scene without overwriting files
+    /// Convert a glTF file, a Mitsuba scene or a pbrt scene without overwriting files
     ///
     /// Meshes (as PLY files) and images are written to a folder next to the scene.
     #[command(after_long_help = IMPORT_HELP)]
@@ -281,15 +287,15 @@ and something is approximated.";
 /// Arguments of `import`.
 #[derive(Clone, Debug, clap::Args)]
 pub struct ImportArgs {
-    /// The file to read: gltf, glb
+    /// The file to read: gltf, glb, xml (Mitsuba), pbrt
     #[arg(add = candidates::import_completer())]
     pub file: PathBuf,
     /// The scene to write [default: FILE with .toml, in the current folder]
     #[arg(short, long, value_name = "SCENE")]
     pub output: Option<PathBuf>,
-    /// Fail if anything cannot be converted exactly
-    #[arg(long)]
-    pub strict: bool,
+    /// Options for the scenes of other renderers.
+    #[command(flatten)]
+    pub foreign: ForeignArgs,
     /// Colors: auto, truecolor, 256, 16, none
     #[arg(long, value_parser = choice_parser::<ColorDepthChoice>(), hide_possible_values = true, long_help = choice_long_help::<ColorDepthChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW")]
     pub color: ColorDepthChoice,

@@ -64,8 +64,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> Exit {
     };
     let console = Console::new(args.color_depth_choice());
     let exit = match args.command {
-        Some(Subcommand::Check { scene, sets, json, .. }) => {
-            commands::check::run(&scene, &sets, json, &console)
+        Some(Subcommand::Check { scene, sets, json, foreign, .. }) => {
+            commands::check::run(&scene, &sets, &foreign.options(), json, &console)
         }
         Some(Subcommand::New { file, schema }) => commands::new::run(&file, schema, &console),
         Some(Subcommand::Import(args)) => commands::import::run(&args, &console),

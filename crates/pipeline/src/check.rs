@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use super::formats::foreign::ForeignOptions;
 use super::formats::model::ModelViewOptions;
 use super::inputs::ProtectedInputs;
 use super::memory::MemoryEstimate;
@@ -46,7 +47,20 @@ pub struct SceneSummary {
 /// # Errors
 /// Returns all errors and warnings for the scene and its files.
 pub fn check_scene(path: &Path, sets: &[String]) -> Result<SceneSummary, Failure> {
-    IncrementalSceneChecker::default().check(path, sets, &CancelToken::new())
+    check_scene_with_options(path, sets, &ForeignOptions::default())
+}
+
+/// Like [`check_scene`], with options for the scenes of other renderers.
+///
+/// # Errors
+/// Returns all errors and warnings for the scene and its files.
+pub fn check_scene_with_options(
+    path: &Path,
+    sets: &[String],
+    foreign: &ForeignOptions,
+) -> Result<SceneSummary, Failure> {
+    let mut checker = IncrementalSceneChecker { foreign: foreign.clone(), ..Default::default() };
+    checker.check(path, sets, &CancelToken::new())
 }
 
 /// Checks scenes repeatedly, rereading only files that have changed.
@@ -55,6 +69,8 @@ pub struct IncrementalSceneChecker {
     contents: Arc<FileHashCache>,
     threads: RenderThreads,
     scenes: SceneCache,
+    /// Options for the scenes of other renderers.
+    foreign: ForeignOptions,
 }
 
 /// Returns a conservative estimate of a render's memory use in bytes. Reads all of the scene's files.
@@ -62,7 +78,7 @@ pub struct IncrementalSceneChecker {
 /// # Errors
 /// Returns all errors in the scene and its files.
 pub fn estimate_memory(path: &Path, overrides: &Overrides) -> Result<u64, Failure> {
-    let mut checker = IncrementalSceneChecker::default();
+    let mut checker = IncrementalSceneChecker { foreign: overrides.foreign.clone(), ..Default::default() };
     let (assets, _) = checker.load_all(path, &overrides.sets, &CancelToken::new())?;
     let plan = resolve_plan(&assets.parsed.loaded.scene, path, overrides)
         .map_err(|error| Failure::Scene(vec![*error]))?;
@@ -114,9 +130,10 @@ impl IncrementalSceneChecker {
         let sink = EventSink::silent(0);
         let pool = self.threads.get_or_create_pool(logical_cpu_count(), false)?;
         let reader = FileReader { contents: &self.contents, pool: &pool, sink: &sink, token };
-        let (scenes, mut table) = (&mut self.scenes, StageRecorder::new(None, token));
+        let (scenes, foreign) = (&mut self.scenes, &self.foreign);
+        let mut table = StageRecorder::new(None, token);
         reader.read_until_files_unchanged(&mut table, findings, |reading| {
-            let scene = SceneParseRequest { path, sets, show: ModelViewOptions::default() };
+            let scene = SceneParseRequest { path, sets, show: ModelViewOptions::default(), foreign };
             let parsed = scenes.parse_scene(scene, reading)?;
             let assets = scenes.load_assets(&parsed, TextureSelection::ForCheck, reading)?;
             reading.verify_files_unchanged()?;

@@ -5,6 +5,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use super::formats::has_model_extension;
 use super::identity::path_relative_to_scene;
 use super::prepare::SceneAssets;
 use super::stages::meshes::MeshesByFileIndex;
@@ -35,7 +36,8 @@ impl ProtectedInputs {
         let loaded = &parsed.loaded;
         let scene = &loaded.scene;
         let path = loaded.path.clone();
-        let role = if loaded.is_foreign() { "the model" } else { "the scene file" };
+        let role =
+            if loaded.is_foreign() && has_model_extension(&path) { "the model" } else { "the scene file" };
         let mut inputs = Self(vec![ProtectedInput { path, role: role.to_owned(), place: None }]);
         let mut add = |path: &Path, span: &Range<usize>, role: String| {
             let place = Some((Arc::clone(loaded), span.clone()));

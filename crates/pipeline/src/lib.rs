@@ -54,7 +54,9 @@ use glimt_scene as scene;
 use glimt_trace::{integrators, world};
 
 pub use build::BUILD;
-pub use check::{IncrementalSceneChecker, SceneSummary, check_scene, estimate_memory};
+pub use check::{
+    IncrementalSceneChecker, SceneSummary, check_scene, check_scene_with_options, estimate_memory,
+};
 pub use formats::{
     ImportError, ImportedScene, foreign_file_error, has_foreign_extension, has_importable_extension,
     has_model_extension, import_scene,

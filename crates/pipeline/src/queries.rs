@@ -4,6 +4,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use super::formats::has_model_extension;
 use super::inputs::ProtectedInputs;
 use super::prepare::{ReadyScene, RequestCamera};
 use super::protocol::{
@@ -17,7 +18,8 @@ use crate::control::CancelToken;
 use crate::film::FilmQuantity;
 use crate::integrators::RenderSettings;
 use crate::messages::{
-    ALREADY_EXISTS, CAMERA_CHANGED, MODEL_MISSING, NOT_UNDONE, SCENE_FILE_CHANGED, SCENE_FILE_MISSING,
+    ALREADY_EXISTS, CAMERA_CHANGED, FOREIGN_SCENE_NOT_WRITTEN, MODEL_MISSING, NOT_UNDONE, SCENE_FILE_CHANGED,
+    SCENE_FILE_MISSING,
 };
 use crate::output::{AttributeLossPolicy, OutputError, write};
 use crate::scene::description::CameraOverrides;
@@ -147,6 +149,10 @@ impl QueryContext {
     ) -> Result<CameraSaveResult, String> {
         let loaded = &self.parsed.loaded;
         let path = loaded.path.clone();
+        if loaded.is_foreign() && !has_model_extension(&path) {
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            return Err(format!("{} {name}", FOREIGN_SCENE_NOT_WRITTEN));
+        }
         if loaded.is_foreign() {
             return match is_file_missing(&path) {
                 true => Err(format!("{} {MODEL_MISSING}", path.display())),

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+pub use super::formats::foreign::{ForeignOptions, MissingAssetMode};
 use super::turntable::TurntableFrame;
 use crate::choice;
 use crate::film::Rect;
@@ -43,6 +44,8 @@ macro_rules! overrides {
             pub layers: Vec<OutputLayer>,
             /// Turntable frame, or `None` for a still image.
             pub turn: Option<TurntableFrame>,
+            /// Options for the scenes of other renderers.
+            pub foreign: ForeignOptions,
             /// Pixels to render. The rest of the image stays black.
             pub crop: Option<Rect>,
             /// Number of threads. `None` or 0 means one per core.

@@ -27,11 +27,12 @@ mod toml;
 use glimt_base::{choice, film, math, sampling, system};
 use glimt_kernel::{geometry, lights, materials};
 
+use std::collections::HashSet;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-pub use self::toml::{BuiltValue, SceneDocumentBuilder, quote_toml_string};
+pub use self::toml::{BuiltValue, GeneratedFile, SceneDocumentBuilder, quote_toml_string};
 pub use changes::{MAX_COMPARED_BYTES, list_changes};
 use description::{Camera, ResolvedCamera, Scene};
 use diagnostic::{Diagnostic, Severity};
@@ -40,7 +41,7 @@ pub use facing::MeshBoundingBox;
 pub use key_path::{shortened_key, split_at_unquoted_space, split_dotted_key};
 pub use other_content::{NEW_SCENE_HELP, detect_image_or_part_file, has_scene_extension};
 pub use read::{find_renamed_scene_by_text, lacks_camera_header, missing_file_help};
-pub use source::SceneText;
+pub use source::{SceneText, SourceFiles};
 
 /// Maximum size of a scene file in bytes.
 pub const MAX_FILE_BYTES: u64 = 128 << 20;
@@ -107,6 +108,13 @@ impl LoadedScene {
         self.built.is_some()
     }
 
+    /// The files that exist only in memory, with their paths.
+    pub fn generated_files(&self) -> impl Iterator<Item = (PathBuf, &GeneratedFile)> {
+        let folder = self.path.parent().unwrap_or(Path::new(""));
+        let files = self.built.iter().flat_map(|built| built.generated.iter());
+        files.map(move |(name, file)| (folder.join(name), file))
+    }
+
     /// Returns the text of the scene file after writing `camera` to `[camera]`. Replaces numbers in place and
     /// adds missing keys. Comments and formatting stay unchanged.
     ///
@@ -148,9 +156,7 @@ impl LoadedScene {
     /// Returns the 1-based line number in the file where `span` starts, or `None` if the file has no text for
     /// it.
     pub fn line_number(&self, span: &Range<usize>) -> Option<usize> {
-        let before = self.source.file_text().get(..span.start).unwrap_or_default();
-        let line = before.bytes().filter(|byte| *byte == b'\n').count() + 1;
-        self.source.is_span_in_text(span).then_some(line)
+        self.source.is_span_in_text(span).then(|| self.source.line_number(span))
     }
 
     /// Returns the span of a setting's value in the file or in a `--set` argument, or `None` if neither sets
@@ -209,9 +215,14 @@ pub fn load_built(
     path: &Path,
     sets: &[String],
 ) -> Result<LoadedScene, Vec<Diagnostic>> {
-    let source = SceneText::with_set_args(Arc::clone(&built.source), sets)?.mark_foreign();
-    let outcome = document::lower_built(&source, &built.document, path);
-    let named = if sets.is_empty() { Vec::new() } else { document::referenced_files(&built.document, path) };
+    let source =
+        SceneText::with_set_args(Arc::clone(&built.source), sets)?.mark_foreign(Arc::clone(&built.files));
+    let outcome = document::lower_built(&source, &built, path);
+    let mut named =
+        if sets.is_empty() { Vec::new() } else { document::referenced_files(&built.document, path) };
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let generated: HashSet<PathBuf> = built.generated.keys().map(|name| folder.join(name)).collect();
+    named.retain(|file| !generated.contains(file));
     loaded_scene_from_parse_outcome(outcome, source, Some(Arc::new(built)), path, named)
 }
 

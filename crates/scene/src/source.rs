@@ -10,6 +10,89 @@ use super::toml::{is_one_dotted_key_assignment, quote_toml_string};
 /// File name shown in diagnostics about `--set` values.
 const SET_OPTION: &str = "--set";
 
+/// The texts of a foreign scene's files, concatenated. Byte offsets into the concatenation identify places in
+/// all files.
+#[derive(Clone, Debug, Default)]
+pub struct SourceFiles {
+    all: String,
+    files: Vec<SourceFile>,
+}
+
+/// A file in [`SourceFiles`].
+#[derive(Clone, Debug)]
+pub(crate) struct SourceFile {
+    path: PathBuf,
+    text: Arc<str>,
+    /// Offset of the text in the concatenation.
+    start: usize,
+}
+
+impl SourceFile {
+    /// Converts a span in the concatenation to a span in this file. Returns `None` if it is elsewhere.
+    fn local_span(&self, span: &Range<usize>) -> Option<Range<usize>> {
+        let end = self.start + self.text.len();
+        (self.start <= span.start && span.end <= end).then(|| span.start - self.start..span.end - self.start)
+    }
+}
+
+impl SourceFiles {
+    /// Adds a file and returns the offset of its text.
+    pub fn add(&mut self, path: &Path, text: Arc<str>) -> usize {
+        // A newline separates the files.
+        if !self.files.is_empty() {
+            self.all.push('\n');
+        }
+        let start = self.all.len();
+        self.all.push_str(&text);
+        self.files.push(SourceFile { path: path.to_owned(), text, start });
+        start
+    }
+
+    /// Length of all texts in bytes.
+    pub fn total_bytes(&self) -> usize {
+        self.all.len()
+    }
+
+    /// The text of all files.
+    pub fn text(&self) -> &str {
+        &self.all
+    }
+
+    /// Creates a diagnostic at a span of the concatenation. An empty path is used if no file contains it.
+    pub fn diagnostic(
+        &self,
+        severity: Severity,
+        span: Range<usize>,
+        message: impl Into<String>,
+        label: impl Into<String>,
+        help: Option<String>,
+    ) -> Diagnostic {
+        let found = self.files.iter().find_map(|file| Some((file, file.local_span(&span)?)));
+        let path = found.as_ref().map_or_else(
+            || self.files.first().map_or_else(PathBuf::new, |first| first.path.clone()),
+            |(file, _)| file.path.clone(),
+        );
+        let place = found
+            .filter(|(file, local)| file.text.get(local.clone()).is_some())
+            .map(|(file, span)| SourceSpan { source: Arc::clone(&file.text), span, label: label.into() });
+        Diagnostic { severity, message: message.into(), path, place, help }
+    }
+
+    /// Returns the path of the file that contains a span.
+    pub fn path_at(&self, span: &Range<usize>) -> Option<&Path> {
+        self.files.iter().find(|file| file.local_span(span).is_some()).map(|file| file.path.as_path())
+    }
+
+    pub(crate) fn into_parts(self) -> (Arc<str>, Arc<[SourceFile]>) {
+        (self.all.into(), self.files.into())
+    }
+}
+
+/// Returns the 1-based number of the line that contains a byte offset.
+fn line_number_at(text: &str, offset: usize) -> usize {
+    text.get(..offset).unwrap_or_default().bytes().filter(|byte| *byte == b'\n').count() + 1
+}
+
 /// The text of a scene file, and the `--set` values.
 #[derive(Clone, Debug)]
 pub struct SceneText {
@@ -19,6 +102,8 @@ pub struct SceneText {
     sets: Vec<SetArg>,
     /// Whether the scene is from a foreign file. Only some of its values have a span in the file's text.
     is_foreign: bool,
+    /// The files of a foreign scene. Empty if the text is a single file.
+    files: Arc<[SourceFile]>,
 }
 
 /// A `--set` value: its span in the whole text, and a copy of its text for diagnostics.
@@ -31,7 +116,7 @@ struct SetArg {
 impl SceneText {
     /// Wraps the text of a file, without `--set` values.
     pub fn from_file_text(text: Arc<str>) -> Self {
-        Self { file: text.len(), all: text, sets: Vec::new(), is_foreign: false }
+        Self { file: text.len(), all: text, sets: Vec::new(), is_foreign: false, files: Arc::new([]) }
     }
 
     /// Combines a file's text with `--set` values of the form `TABLE.KEY=VALUE`. Values that are neither
@@ -56,7 +141,8 @@ impl SceneText {
             }
         }
         if wrong.is_empty() {
-            Ok(Self { all: all.into(), file: file.len(), sets: known, is_foreign: false })
+            let (all, file, files) = (all.into(), file.len(), Arc::new([]));
+            Ok(Self { all, file, sets: known, is_foreign: false, files })
         } else {
             Err(wrong)
         }
@@ -94,9 +180,18 @@ impl SceneText {
         !self.is_foreign || *span != (0..0)
     }
 
-    /// Marks the text as the text of a foreign file, which is empty if the file is not text.
-    pub(super) fn mark_foreign(self) -> Self {
-        Self { is_foreign: true, ..self }
+    /// Marks the text as the text of a foreign file, which is empty if the file is not text. `files` are the
+    /// files that it consists of, if there are several.
+    pub(super) fn mark_foreign(self, files: Arc<[SourceFile]>) -> Self {
+        Self { is_foreign: true, files, ..self }
+    }
+
+    /// Returns the 1-based number of the line where a span starts, in its own file.
+    pub(super) fn line_number(&self, span: &Range<usize>) -> usize {
+        match self.files.iter().find_map(|file| Some((file, file.local_span(span)?))) {
+            Some((file, local)) => line_number_at(&file.text, local.start),
+            None => line_number_at(self.file_text(), span.start),
+        }
     }
 
     /// Maps a span to the file at `path` or to a `--set` value. Returns no span if it does not refer to text.
@@ -112,7 +207,10 @@ impl SceneText {
                 (Path::new(SET_OPTION), text, span.start - own.start..span.end - own.start)
             }
             None if !self.is_span_in_text(&span) => return (path.to_owned(), None),
-            None => (path, &self.all, span),
+            None => match self.files.iter().find_map(|file| Some((file, file.local_span(&span)?))) {
+                Some((file, local)) => (file.path.as_path(), &file.text, local),
+                None => (path, &self.all, span),
+            },
         };
         let is_inside = source.get(span.clone()).is_some();
         let span = if is_inside { span } else { 0..0 };

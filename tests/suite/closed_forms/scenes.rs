@@ -15,8 +15,8 @@ use glimt::materials::texels::{TexelData, Texels};
 use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::light::{Falloff, PointLight};
 use glimt::scene::description::{
-    Accel, AffineMap, Camera, CoatSource, ColorSource, ConductorFresnelSource, EmissionSource, Environment,
-    ImageShiftAndMirror, ImageSource, Integrator, Light, MapOrientation, Material, MaterialKind, MeshFile,
+    Accel, AffineMap, Camera, CoatSource, ColorSource, EmissionSource, Environment, FresnelSource,
+    ImageSource, ImageWindow, Integrator, Light, MapOrientation, MapRows, Material, MaterialKind, MeshFile,
     MeshReference, MicrofacetDistribution, NumberSource, Object, ObjectTransform, OpacitySource, Pattern,
     PhongParameters, PhotonOptions, PixelFilter, Projection, ReflectingSides, RenderOptions, Scene,
     ShadowMode, Shape, Sky, Spanned, Texture, TextureContent, TextureEncoding, TextureFilter, Tonemap, UvSet,
@@ -261,8 +261,8 @@ impl Build {
     pub fn environment(self, radiance: f32) -> Self {
         let color = Vec3::splat(radiance);
         self.with(|scene| {
-            scene.environment =
-                Some(Environment { color, file: None, sky: None, orientation: MapOrientation::Turn(0.0) });
+            let (orientation, rows) = (MapOrientation::Turn(0.0), MapRows::Centers);
+            scene.environment = Some(Environment { color, file: None, sky: None, orientation, rows });
         })
     }
 
@@ -277,7 +277,8 @@ impl Build {
         self.sky = Some(Arc::new(Texels { width, height, data: TexelData::Float(texels), unusable: 0 }));
         let file = Some(Spanned { value: PathBuf::from("sky.exr"), span: 0..0 });
         self.with(|scene| {
-            scene.environment = Some(Environment { color: Vec3::ONE, file, sky: None, orientation });
+            let rows = MapRows::Centers;
+            scene.environment = Some(Environment { color: Vec3::ONE, file, sky: None, orientation, rows });
         })
     }
 
@@ -288,6 +289,7 @@ impl Build {
             file: None,
             sky: Some(sky),
             orientation: MapOrientation::Turn(rotate),
+            rows: MapRows::Centers,
         };
         self.with(|scene| scene.environment = Some(environment))
     }
@@ -308,7 +310,8 @@ impl Build {
         let geometry = Geometry::from_scene(&self.scene, &parts.meshes, origin, &CancelToken::new());
         let geometry = Arc::new(geometry.expect("not canceled"));
         let sky = self.scene.environment.as_ref().and_then(|environment| environment.sky.as_ref());
-        let map = || self.sky.as_ref().and_then(build_environment_map).map(EnvironmentSource::Map);
+        let map = || self.sky.as_ref().and_then(|texels| build_environment_map(texels, MapRows::Centers));
+        let map = || map().map(EnvironmentSource::Map);
         let sky = sky.map(|sky| EnvironmentSource::Sky(build_sky(sky))).or_else(map);
         let lights = build_lights(&self.scene, &geometry, &parts.images, sky, &CancelToken::new())
             .expect("not canceled");
@@ -498,6 +501,7 @@ pub fn plastic(diffuse: f32, roughness: f32) -> Material {
         ior: 1.5,
         roughness: NumberSource::Constant(roughness),
         distribution: MicrofacetDistribution::Ggx,
+        nonlinear: true,
     })
 }
 

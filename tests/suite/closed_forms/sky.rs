@@ -313,7 +313,8 @@ fn single_texel_map_is_a_constant_color() {
 /// A sky with the sun toward `sun`.
 fn clear(sun: DVec3, sun_scale: f32, sky_scale: f32) -> Sky {
     let ground = Vec3::splat(0.3);
-    Sky { sun: sun.normalize(), turbidity: 3.0, ground, sun_angle: 0.5338, sun_scale, sky_scale }
+    let (sun, ground_scale) = (sun.normalize(), 1.0);
+    Sky { sun, turbidity: 3.0, ground, sun_angle: 0.5338, sun_scale, sky_scale, ground_scale }
 }
 
 #[test]

@@ -12,4 +12,4 @@ pub mod random;
 pub mod soa;
 pub mod transform;
 
-pub use glam::{DMat3, DVec2, DVec3, DVec4, Mat3, UVec2, Vec2, Vec3, Vec4};
+pub use glam::{DMat3, DMat4, DVec2, DVec3, DVec4, Mat3, UVec2, Vec2, Vec3, Vec4};

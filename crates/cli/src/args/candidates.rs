@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 
 use clap_complete::engine::{ArgValueCompleter, CompletionCandidate, PathCompleter};
 
-use crate::pipeline::{has_foreign_extension, has_importable_extension};
+use crate::pipeline::{has_foreign_extension, has_importable_extension, has_model_extension};
 use crate::scene::keys::key::{KeyInfo, TableSyntax, ValueKind};
 use crate::scene::keys::{all_paths_with_descriptions, all_tables, color_names};
 use crate::scene::outline::{OutlineTable, document_outline};
@@ -28,6 +28,14 @@ fn command_line_words() -> Vec<OsString> {
 /// Completes scenes.
 pub(crate) fn scene_completer() -> ArgValueCompleter {
     ArgValueCompleter::new(PathCompleter::file().filter(has_scene_extension))
+}
+
+/// Completes scenes, including those of other renderers.
+pub(crate) fn any_scene_completer() -> ArgValueCompleter {
+    let is_scene = |path: &std::path::Path| {
+        has_scene_extension(path) || has_foreign_extension(path) && !has_model_extension(path)
+    };
+    ArgValueCompleter::new(PathCompleter::file().filter(is_scene))
 }
 
 /// Completes scenes and foreign files.

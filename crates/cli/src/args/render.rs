@@ -8,7 +8,7 @@ use super::parsers::{
     parse_layers, parse_niceness, parse_notification_time, parse_positive_seconds, parse_shard,
     parse_thread_count, parse_turntable_frames,
 };
-use super::{ProgressMode, Switch, candidates};
+use super::{ForeignArgs, ProgressMode, Switch, candidates};
 use crate::film::Rect;
 use crate::output::{AnimationFormat, Format};
 use crate::pipeline::settings::{CheckpointSettings, Overrides, ResumeMode, UpAxis, ViewMode, ViewSide};
@@ -19,7 +19,7 @@ use crate::tui::{ColorDepthChoice, PreviewChoice};
 /// Arguments of a render. Options override the scene's settings for this run.
 #[derive(Clone, Debug, clap::Args)]
 pub struct RenderArgs {
-    /// A scene (TOML) or a model: obj, off, ply, stl, glb, gltf
+    /// A scene (TOML, Mitsuba's XML, or pbrt) or a model: obj, off, ply, stl, glb, gltf
     #[arg(required = true, add = candidates::scene_or_foreign_completer(), value_name = "SCENE")]
     pub scene: Option<PathBuf>,
     /// Render once, write the image and exit
@@ -33,6 +33,10 @@ pub struct RenderArgs {
     /// precedence.
     #[arg(long = "set", add = candidates::key_assignment_completer(), value_name = "TABLE.KEY=VALUE")]
     pub sets: Vec<String>,
+
+    /// Options for the scenes of other renderers.
+    #[command(flatten)]
+    pub foreign: ForeignArgs,
 
     /// Output file; can be given several times
     #[arg(short, long = "output", value_name = "FILE", long_help = outputs_help(), help_heading = "Output")]
@@ -181,6 +185,7 @@ impl RenderArgs {
             view: self.view,
             from: self.from,
             up: self.up,
+            foreign: self.foreign.options(),
             layers: self.layers.clone().map_or_else(Vec::new, |OutputLayers(layers)| layers),
             turn: self.turntable.map(|of| TurntableFrame { number: 0, of }),
             crop: self.crop,

@@ -10,17 +10,24 @@ use crate::diagnostic_json::diagnostic_to_json;
 use crate::exit::Exit;
 use crate::output::json::to_line_without_newline;
 use crate::pipeline::protocol::Failure;
-use crate::pipeline::{SceneSummary, check_scene};
+use crate::pipeline::settings::ForeignOptions;
+use crate::pipeline::{SceneSummary, check_scene_with_options};
 use crate::scene::report::LineColumnLocator;
 
-pub(crate) fn run(scene: &Path, sets: &[String], is_json: bool, console: &Console) -> Exit {
+pub(crate) fn run(
+    scene: &Path,
+    sets: &[String],
+    foreign: &ForeignOptions,
+    is_json: bool,
+    console: &Console,
+) -> Exit {
     if is_json {
-        return check_and_print_json(scene, sets, console);
+        return check_and_print_json(scene, sets, foreign, console);
     }
     if let Some(exit) = report_image_instead_of_scene(scene, false, console) {
         return exit;
     }
-    match check_scene(scene, sets) {
+    match check_scene_with_options(scene, sets, foreign) {
         Ok(checked) => {
             console.print_diagnostics(&checked.warnings);
             console.print_line(&format_scene_counts(scene, &checked));
@@ -35,8 +42,8 @@ pub(crate) fn run(scene: &Path, sets: &[String], is_json: bool, console: &Consol
 }
 
 /// Reports the result as one JSON object on stdout.
-fn check_and_print_json(scene: &Path, sets: &[String], console: &Console) -> Exit {
-    let (exit, diagnostics) = match check_scene(scene, sets) {
+fn check_and_print_json(scene: &Path, sets: &[String], foreign: &ForeignOptions, console: &Console) -> Exit {
+    let (exit, diagnostics) = match check_scene_with_options(scene, sets, foreign) {
         Ok(checked) => (Exit::DONE, checked.warnings),
         Err(Failure::Scene(diagnostics)) => (Exit::WRONG, diagnostics),
         Err(Failure::Work(message)) => return console.print_error(Exit::FAILED, &message),

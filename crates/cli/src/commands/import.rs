@@ -38,14 +38,18 @@ fn convert_and_write(args: &ImportArgs, console: &Console, token: &CancelToken) 
             &format!("{} already exists; choose another scene with -o", there.display()),
         );
     }
-    let imported = match import_scene(&args.file, &folder, token) {
+    let imported = match import_scene(&args.file, &folder, &args.foreign.options(), token) {
         Ok(imported) => imported,
         Err(_) if token.is_canceled() => return Exit::FAILED,
+        Err(ImportError::Scene(diagnostics)) => {
+            console.print_diagnostics(&diagnostics);
+            return Exit::WRONG;
+        }
         Err(ImportError::File(message)) => return console.print_error(Exit::WRONG, &message),
         Err(ImportError::Work(message)) => return console.print_error(Exit::FAILED, &message),
     };
     report_approximations(&imported.substitutions, console);
-    if args.strict && !imported.substitutions.is_empty() {
+    if args.foreign.strict && !imported.substitutions.is_empty() {
         let what = format_count(imported.substitutions.len() as u64, "approximation");
         return console.print_error(Exit::WRONG, &format!("{what} with --strict: nothing was written"));
     }

@@ -3,10 +3,12 @@
 pub mod catch_panic;
 mod file_material;
 pub mod gltf;
+mod gzip;
 pub mod image;
 pub mod mesh;
 pub mod orbiter;
 mod read;
+mod text_file;
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -15,6 +17,9 @@ use crate::control::{CancelToken, Canceled};
 use crate::geometry::mesh::TriangleMesh;
 use crate::system::file::FileStamp;
 use crate::system::{RAISE_FILE_LIMIT, describe_error, is_too_many_open_files};
+
+pub use gzip::{GzipFile, read_gzip_file};
+pub use text_file::{TextFile, read_text_file};
 
 pub use file_material::{FileLine, FileMaterial, FileMaterialKind, FileTexture, PhysicalMaterial};
 

@@ -2,10 +2,12 @@
 
 use std::path::Path;
 
+use super::foreign::{ForeignError, ForeignOptions};
 use super::model::ModelViewOptions;
 use super::{FORMATS, ForeignFormat, ForeignReadContext, ImportedScene};
 use crate::assets::AssetError;
 use crate::control::CancelToken;
+use crate::scene::diagnostic::Diagnostic;
 use crate::stages::containers::GltfContainers;
 use crate::system::threads::logical_cpu_pool;
 
@@ -14,6 +16,8 @@ use crate::system::threads::logical_cpu_pool;
 pub enum ImportError {
     /// The file or the command line is invalid.
     File(String),
+    /// The file has errors.
+    Scene(Vec<Diagnostic>),
     /// There is not enough memory, or a thread cannot be started.
     Work(String),
 }
@@ -23,7 +27,12 @@ pub enum ImportError {
 /// # Errors
 /// Returns an error if the file is invalid, memory runs out, a thread cannot be started, or the token is
 /// canceled.
-pub fn import_scene(path: &Path, folder: &str, token: &CancelToken) -> Result<ImportedScene, ImportError> {
+pub fn import_scene(
+    path: &Path,
+    folder: &str,
+    options: &ForeignOptions,
+    token: &CancelToken,
+) -> Result<ImportedScene, ImportError> {
     let Some(convert) = ForeignFormat::from_extension(path).and_then(|format| format.convert) else {
         let importable = FORMATS.iter().filter(|format| format.convert.is_some());
         let list: Vec<_> =
@@ -35,13 +44,20 @@ pub fn import_scene(path: &Path, folder: &str, token: &CancelToken) -> Result<Im
     };
     let pool = logical_cpu_pool().map_err(ImportError::Work)?;
     let (view, containers) = (ModelViewOptions::default(), GltfContainers::default());
-    let context = ForeignReadContext { view, containers: &containers, token };
+    let context = ForeignReadContext { view, options, containers: &containers, token };
     pool.install(|| convert(path, folder, &context)).map_err(|error| match error {
+        ForeignError::Scene { diagnostics, companions: _ } => ImportError::Scene(diagnostics),
+        ForeignError::Asset(error) => import_error(&error),
+    })
+}
+
+fn import_error(error: &AssetError) -> ImportError {
+    match error {
         AssetError::OutOfMemory { .. }
         | AssetError::MemoryLimit { .. }
         | AssetError::TooManyOpenFiles { .. } => ImportError::Work(error.to_string()),
         AssetError::Unreadable { .. } | AssetError::Malformed { .. } | AssetError::Canceled(_) => {
             ImportError::File(error.to_string())
         }
-    })
+    }
 }

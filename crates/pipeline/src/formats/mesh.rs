@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
+use super::foreign::ForeignError;
 use super::frame::{FOV, frame_model};
 use super::model::{
     DEFAULT_SIZE, Lighting, POLISHED_EXPONENT, POLISHED_ROUGHNESS, UsedNames, add_camera, add_ground,
@@ -81,19 +82,19 @@ fn is_mesh_fully_transparent(loaded: &LoadedMesh) -> bool {
 pub(super) fn read_obj_or_off(
     path: &Path,
     context: &ForeignReadContext<'_>,
-) -> Result<ForeignScene, AssetError> {
+) -> Result<ForeignScene, ForeignError> {
     scene_of_mesh(path, UpAxis::Y, false, context)
 }
 
 /// Reads a PLY file. The default up axis is z for files from Blender, and y for all others.
-pub(super) fn read_ply(path: &Path, context: &ForeignReadContext<'_>) -> Result<ForeignScene, AssetError> {
+pub(super) fn read_ply(path: &Path, context: &ForeignReadContext<'_>) -> Result<ForeignScene, ForeignError> {
     let up = if is_from_blender(path) { UpAxis::Z } else { UpAxis::Y };
     scene_of_mesh(path, up, false, context)
 }
 
 /// Reads an STL file. By the convention of CAD and 3D printing, z is the up axis. STL has no vertex normals,
 /// and mechanical parts have sharp edges.
-pub(super) fn read_stl(path: &Path, context: &ForeignReadContext<'_>) -> Result<ForeignScene, AssetError> {
+pub(super) fn read_stl(path: &Path, context: &ForeignReadContext<'_>) -> Result<ForeignScene, ForeignError> {
     scene_of_mesh(path, UpAxis::Z, true, context)
 }
 
@@ -102,11 +103,11 @@ fn scene_of_mesh(
     path: &Path,
     up: UpAxis,
     is_faceted: bool,
-    &ForeignReadContext { view, containers, token }: &ForeignReadContext<'_>,
-) -> Result<ForeignScene, AssetError> {
+    &ForeignReadContext { view, containers, token, .. }: &ForeignReadContext<'_>,
+) -> Result<ForeignScene, ForeignError> {
     let loaded = containers.load_any_mesh(path, None, &ignore_progress, token)?;
     let Some([min, max]) = loaded.mesh.bounds_in_file_coordinates() else {
-        return Err(AssetError::malformed(path, None, "no usable face"));
+        return Err(AssetError::malformed(path, None, "no usable face").into());
     };
     let up = view.up.unwrap_or(up);
     let upright = |at: DVec3| up.rotate_point_upright(at);
@@ -127,7 +128,7 @@ fn scene_of_mesh(
         let reason = format!(
             "its coordinates extend to {farthest:e}, which places the camera at {eye_reach:.0e}; coordinates must be below {MAX_MAGNITUDE:e}"
         );
-        return Err(AssetError::malformed(path, None, reason));
+        return Err(AssetError::malformed(path, None, reason).into());
     }
     let (mut document, mut names) = (SceneDocumentBuilder::default(), UsedNames::default());
     document.add_comment_above_next_table(format!("{}, as glimt shows it.", file_name(path)));

@@ -7,19 +7,23 @@
 //! `model` generates the view and the lights for models, which `glimt MODEL` and `glimt import` share so that
 //! they produce the same image.
 
+pub(crate) mod foreign;
 mod frame;
 mod gltf;
 mod import;
 mod mesh;
+mod mitsuba;
 pub(crate) mod model;
+mod pbrt;
 mod rounding;
 
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
+use self::foreign::{ForeignError, ForeignOptions};
 use self::model::ModelViewOptions;
 use super::stages::containers::GltfContainers;
-use crate::assets::{AssetError, Companion, FileHash};
+use crate::assets::{Companion, FileHash};
 use crate::control::CancelToken;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::sanitize::escape_invisible_chars;
@@ -32,8 +36,13 @@ use crate::system::file::{FileKind, file_kind};
 pub use import::{ImportError, import_scene};
 
 /// All foreign formats.
-const FORMATS: [ForeignFormat; 4] = [
-    ForeignFormat { extensions: &["obj", "off"], is_model: true, read: mesh::read_obj_or_off, convert: None },
+const FORMATS: [ForeignFormat; 6] = [
+    ForeignFormat {
+        extensions: &["obj", "off", "serialized"],
+        is_model: true,
+        read: mesh::read_obj_or_off,
+        convert: None,
+    },
     ForeignFormat { extensions: &["ply"], is_model: true, read: mesh::read_ply, convert: None },
     ForeignFormat { extensions: &["stl"], is_model: true, read: mesh::read_stl, convert: None },
     ForeignFormat {
@@ -41,6 +50,13 @@ const FORMATS: [ForeignFormat; 4] = [
         is_model: true,
         read: gltf::read,
         convert: Some(gltf::convert),
+    },
+    ForeignFormat { extensions: &["pbrt"], is_model: false, read: pbrt::read, convert: Some(pbrt::convert) },
+    ForeignFormat {
+        extensions: &["xml"],
+        is_model: false,
+        read: mitsuba::read,
+        convert: Some(mitsuba::convert),
     },
 ];
 
@@ -65,14 +81,16 @@ pub(crate) struct ForeignFormat {
     convert: Option<ConvertFn>,
 }
 
-type ReadFn = fn(&Path, &ForeignReadContext<'_>) -> Result<ForeignScene, AssetError>;
-type ConvertFn = fn(&Path, &str, &ForeignReadContext<'_>) -> Result<ImportedScene, AssetError>;
+type ReadFn = fn(&Path, &ForeignReadContext<'_>) -> Result<ForeignScene, ForeignError>;
+type ConvertFn = fn(&Path, &str, &ForeignReadContext<'_>) -> Result<ImportedScene, ForeignError>;
 
 /// Inputs of an importer other than the file.
 #[derive(Clone, Copy)]
 pub(crate) struct ForeignReadContext<'a> {
     /// View of a model.
     pub(crate) view: ModelViewOptions,
+    /// Options for the scenes of other renderers.
+    pub(crate) options: &'a ForeignOptions,
     /// Files that are open. Meshes stored here are not read again when the scene's assets are loaded.
     pub(crate) containers: &'a GltfContainers,
     pub(crate) token: &'a CancelToken,
@@ -117,7 +135,12 @@ pub(crate) fn scene_from_document(
     load_built(document, path, sets).map_err(|mut errors| {
         // Mark errors in generated values, which the user cannot see. Errors in overrides need no mark.
         for error in errors.iter_mut().filter(|error| error.path == path && error.place.is_none()) {
-            error.message = format!("in the scene generated for this model, {}", error.message);
+            let what = if has_model_extension(path) {
+                "generated for this model"
+            } else {
+                "converted from this file"
+            };
+            error.message = format!("in the scene {what}, {}", error.message);
         }
         errors
     })
@@ -250,7 +273,10 @@ mod tests {
             let Diagnostic { message, help, .. } = message(&path);
             let help = help.expect("a help text");
             if name == "d.FBX" {
-                assert!(message.contains(".fbx") && help.contains(".obj, .off, .ply, .stl, .glb, .gltf"));
+                assert!(
+                    message.contains(".fbx")
+                        && help.contains(".obj, .off, .serialized, .ply, .stl, .glb, .gltf")
+                );
             } else {
                 assert_eq!(message, "this is a mesh, not a scene");
                 assert!(help.contains(&format!("`file = \"{name}\"`")), "{help}");

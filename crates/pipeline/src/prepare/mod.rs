@@ -80,8 +80,12 @@ impl SceneCache {
         let needed = find_needed_textures(loaded, &meshes, selection, &self.textures);
         let stage = table.start(Stage::Textures);
         let textures = stage.finish(load_textures(loaded, &needed, &mut self.textures, findings, files)?);
-        let glass = find_glass_solids(loaded, &meshes, &mut self.glass, findings, files.token)?;
-        warn_about_coplanar_lights(parsed, &meshes, &mut self.coplanar, findings);
+        let (glass, coplanar) = (&mut self.glass, &mut self.coplanar);
+        let glass = files.pool.install(|| {
+            let glass = find_glass_solids(loaded, &meshes, glass, findings, files.token)?;
+            warn_about_coplanar_lights(parsed, &meshes, coplanar, findings);
+            Ok::<_, AbortReason>(glass)
+        })?;
         let (parsed, textures, files) = (Arc::clone(parsed), Arc::new(textures), findings.files.clone());
         Ok(SceneAssets { parsed, meshes, glass, textures, needed, files })
     }

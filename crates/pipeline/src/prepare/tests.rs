@@ -6,6 +6,7 @@ use rayon::ThreadPool;
 
 use super::*;
 use crate::control::CancelToken;
+use crate::formats::foreign::ForeignOptions;
 use crate::formats::model::ModelViewOptions;
 use crate::lights::Lights;
 use crate::plan::resolve_plan;
@@ -58,7 +59,9 @@ impl SceneFixture {
         let reader = FileReader { contents: &self.contents, pool: &self.pool, sink: &sink, token: &token };
         let scenes = &mut self.scenes;
         let assets = reader.read_until_files_unchanged(&mut table, &mut findings, |reading| {
-            let scene = SceneParseRequest { path: &path, sets: &[], show: ModelViewOptions::default() };
+            let foreign = ForeignOptions::default();
+            let show = ModelViewOptions::default();
+            let scene = SceneParseRequest { path: &path, sets: &[], show, foreign: &foreign };
             let parsed = scenes.parse_scene(scene, reading)?;
             let all = TextureSelection::ForImage(TextureRolesNeededByRender::ALL);
             let assets = scenes.load_assets(&parsed, all, reading)?;

@@ -53,7 +53,8 @@ impl Session {
     ) -> Result<(SceneAssets, RequestPlans), AbortReason> {
         let (Request { overrides, write, .. }, sink) = (request, reading.files.sink);
         let show = ModelViewOptions::from_overrides(overrides);
-        let scene = SceneParseRequest { path: &request.scene, sets: &overrides.sets, show };
+        let foreign = &overrides.foreign;
+        let scene = SceneParseRequest { path: &request.scene, sets: &overrides.sets, show, foreign };
         let parsed = self.scenes.parse_scene(scene, reading)?;
         if !parsed.loaded.is_foreign() {
             let text = parsed.loaded.source.file_text_as_arc();

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::assets::gltf::{GltfFile, ImageLocation, has_gltf_extension};
-use crate::assets::mesh::load;
+use crate::assets::mesh::{load, load_from_bytes, serialized};
 use crate::assets::{AssetError, FileHash, LoadedMesh};
 use crate::control::{CancelToken, Progress, ignore_progress};
 
@@ -19,6 +19,8 @@ pub(crate) struct GltfContainers {
     gltf: Mutex<HashMap<PathBuf, GltfFileSlot>>,
     /// Meshes loaded before the meshes stage. Each can be taken only once.
     ahead: Mutex<HashMap<PathBuf, LoadedMesh>>,
+    /// Bytes of the files that an importer has generated.
+    generated: Mutex<HashMap<PathBuf, Arc<[u8]>>>,
 }
 
 impl GltfContainers {
@@ -53,6 +55,12 @@ impl GltfContainers {
         progress: Progress<'_>,
         token: &CancelToken,
     ) -> Result<LoadedMesh, AssetError> {
+        if let Some(bytes) = self.generated_file(path) {
+            return load_from_bytes(path, &bytes, progress, token);
+        }
+        if serialized::is_serialized(path) {
+            return serialized::load(path, part, progress, token);
+        }
         if !has_gltf_extension(path) {
             let ahead = self.ahead.lock().unwrap_or_else(PoisonError::into_inner).remove(&canonical(path));
             return ahead.map_or_else(|| load(path, progress, token), Ok);
@@ -62,6 +70,16 @@ impl GltfContainers {
             Some(part) => container.build_part_mesh(part as usize, &ignore_progress, token),
             None => container.merge_scene_into_mesh(token),
         }
+    }
+
+    /// Adds the files that an importer has generated.
+    pub(crate) fn add_generated_files(&self, files: impl Iterator<Item = (PathBuf, Arc<[u8]>)>) {
+        self.generated.lock().unwrap_or_else(PoisonError::into_inner).extend(files);
+    }
+
+    /// Returns the bytes of a file that an importer has generated, or `None` for other files.
+    pub(crate) fn generated_file(&self, path: &Path) -> Option<Arc<[u8]>> {
+        self.generated.lock().unwrap_or_else(PoisonError::into_inner).get(path).cloned()
     }
 
     /// Stores a mesh returned by [`GltfContainers::load_any_mesh`] for the next call.

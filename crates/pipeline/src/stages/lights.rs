@@ -11,7 +11,7 @@ use crate::control::{CancelToken, Canceled};
 use crate::lights::infinite::EnvironmentMap;
 use crate::lights::infinite::sky::Sky;
 use crate::lights::{LightSamplingPurpose, Lights};
-use crate::scene::description::{Material, Scene, TextureRole};
+use crate::scene::description::{MapRows, Material, Scene, TextureRole};
 use crate::scene::fingerprint::{Fingerprint, FingerprintContext, FingerprintHasher};
 use crate::world::{self, EnvironmentSource, Geometry, TextureImageSource};
 
@@ -103,7 +103,8 @@ fn environment_source(
     textures: &Textures,
     cache: &mut LightCache,
 ) -> Option<EnvironmentSource> {
-    let map = environment_map(textures, &mut cache.environment);
+    let rows = scene.environment.as_ref().map_or(MapRows::Centers, |environment| environment.rows);
+    let map = environment_map(textures, rows, &mut cache.environment);
     let Some(sky) = scene.environment.as_ref().and_then(|environment| environment.sky.as_ref()) else {
         cache.sky = Memo::default();
         return map.map(EnvironmentSource::Map);
@@ -117,16 +118,18 @@ fn environment_source(
 
 fn environment_map(
     textures: &Textures,
+    rows: MapRows,
     memo: &mut Memo<Option<Arc<EnvironmentMap>>>,
 ) -> Option<Arc<EnvironmentMap>> {
     let Some((key, texels)) = &textures.environment else {
         *memo = Memo::default();
         return None;
     };
-    if let Some(environment) = memo.get(*key) {
+    let key = FingerprintHasher::new("environment map").add_fingerprint(key).add_choice_name(rows).finish();
+    if let Some(environment) = memo.get(key) {
         return environment.clone();
     }
-    let environment = world::build_environment_map(texels);
-    memo.set(*key, environment.clone());
+    let environment = world::build_environment_map(texels, rows);
+    memo.set(key, environment.clone());
     environment
 }

@@ -61,6 +61,7 @@ pub(crate) fn load_meshes(
     if files.is_empty() {
         return Ok(StageResult::skipped(Vec::new(), reasons::NO_MESHES));
     }
+    reading.add_generated_files(loaded, findings);
     let before: Vec<(FileContentId, Option<Arc<CachedMesh>>)> = files
         .iter()
         .map(|file| {

@@ -19,7 +19,7 @@ use std::collections::HashSet;
 use std::error::Error;
 use std::fmt;
 use std::ops::Range;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -130,6 +130,18 @@ pub(super) struct FileReadContext<'a> {
     pub(super) available_memory: u64,
 }
 
+impl FileReadContext<'_> {
+    /// Makes the files that exist only in memory readable, and keeps them from being watched.
+    pub(super) fn add_generated_files(&self, loaded: &LoadedScene, findings: &mut Findings) {
+        for (path, file) in loaded.generated_files() {
+            self.contents.record_decoded(&path, file.hash);
+            findings.generated.insert(path);
+        }
+        let files = loaded.generated_files().map(|(path, file)| (path, Arc::clone(&file.bytes)));
+        self.containers.add_generated_files(files);
+    }
+}
+
 /// Files, errors and warnings found by a request.
 #[derive(Debug)]
 pub(super) struct Findings {
@@ -138,6 +150,8 @@ pub(super) struct Findings {
     /// All files that the request tried to read, without duplicates.
     pub(super) files: Vec<FilePathAndContentId>,
     known: HashSet<FilePathAndContentId>,
+    /// Files that exist only in memory and are not watched.
+    generated: HashSet<PathBuf>,
     pub(super) errors: Vec<Diagnostic>,
     /// Current reasons for not writing an image.
     pub(super) conflicts: Vec<Diagnostic>,
@@ -150,6 +164,7 @@ impl Default for Findings {
             begun: Instant::now(),
             files: Vec::new(),
             known: HashSet::new(),
+            generated: HashSet::new(),
             errors: Vec::new(),
             conflicts: Vec::new(),
             warnings: Vec::new(),
@@ -164,7 +179,7 @@ impl Findings {
     }
 
     pub(super) fn add_file(&mut self, file: FilePathAndContentId) {
-        if self.known.insert(file.clone()) {
+        if !self.generated.contains(&file.path) && self.known.insert(file.clone()) {
             self.files.push(file);
         }
     }

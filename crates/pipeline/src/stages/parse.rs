@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::super::cache::Memo;
+use super::super::formats::foreign::{ForeignError, ForeignOptions};
 use super::super::formats::model::ModelViewOptions;
 use super::super::formats::{
     ForeignFormat, ForeignReadContext, ForeignScene, foreign_file_error, scene_from_document,
@@ -13,7 +14,7 @@ use super::super::protocol::{Failure, reasons};
 use super::super::watch::content::{FileContentId, FilePathAndContentId};
 use super::{AbortReason, FileReadContext, Findings, StageResult};
 use crate::assets::orbiter::load as load_orbiter;
-use crate::assets::{self, AssetError, GkitOrbiterCamera};
+use crate::assets::{self, AssetError, Companion, GkitOrbiterCamera};
 use crate::control::{CancelToken, Canceled};
 use crate::output::held::{self, BackupRecovery};
 use crate::scene;
@@ -45,6 +46,8 @@ pub(crate) struct SceneParseRequest<'a> {
     pub(crate) sets: &'a [String],
     /// View of a model.
     pub(crate) show: ModelViewOptions,
+    /// Options for the scenes of other renderers.
+    pub(crate) foreign: &'a ForeignOptions,
 }
 
 /// Converts an importer's error. Watches missing files to detect when they are created.
@@ -149,7 +152,7 @@ type SceneAndDependencies =
     (Arc<scene::LoadedScene>, FileContentId, Vec<FilePathAndContentId>, Vec<Diagnostic>);
 
 fn read_scene(
-    SceneParseRequest { path, sets, show }: SceneParseRequest<'_>,
+    SceneParseRequest { path, sets, show, foreign }: SceneParseRequest<'_>,
     format: Option<&ForeignFormat>,
     last: Option<&Arc<ParsedScene>>,
     findings: &mut Findings,
@@ -165,20 +168,49 @@ fn read_scene(
             contents.record_decoded(path, *blake3::hash(loaded.source.file_text().as_bytes()).as_bytes());
         return Ok((Arc::new(loaded), content, Vec::new(), Vec::new()));
     };
-    let context = ForeignReadContext { view: show, containers, token };
-    let ForeignScene { document, hash, companions, notes, substitutions } = (format.read)(path, &context)
-        .map_err(|error| abort_reason_from_import_error(error, findings, reading))?;
-    let loaded = scene_from_document(document, path, sets)
-        .map_err(|errors| AbortReason::Failed(Failure::Scene(errors)))?;
+    let context = ForeignReadContext { view: show, options: foreign, containers, token };
+    let record = |companions: &[Companion]| {
+        let companions = companions.iter().map(|companion| contents.record_companion(companion, token));
+        companions.collect::<Result<Vec<_>, Canceled>>()
+    };
+    let ForeignScene { document, hash, companions, notes, substitutions } =
+        match reading.pool.install(|| (format.read)(path, &context)) {
+            Ok(scene) => scene,
+            Err(ForeignError::Asset(error)) => {
+                return Err(abort_reason_from_import_error(error, findings, reading));
+            }
+            Err(ForeignError::Scene { diagnostics, companions }) => {
+                record(&companions)?.into_iter().for_each(|file| findings.add_file(file));
+                return Err(AbortReason::Failed(Failure::Scene(diagnostics)));
+            }
+        };
     let content = contents.record_decoded(path, hash);
-    let companions = companions.iter().map(|companion| contents.record_companion(companion, token));
-    let companions = companions.collect::<Result<_, Canceled>>()?;
+    let companions = record(&companions)?;
+    let strict = if foreign.is_strict { strict_errors(&substitutions) } else { Vec::new() };
+    let loaded = match strict.is_empty() {
+        true => scene_from_document(document, path, sets),
+        false => Err(strict),
+    };
+    let loaded = loaded.map_err(|errors| {
+        companions.iter().for_each(|file| findings.add_file(file.clone()));
+        AbortReason::Failed(Failure::Scene(errors))
+    })?;
     Ok((Arc::new(loaded), content, companions, [substitutions, notes].concat()))
+}
+
+/// Turns substitutions into errors.
+fn strict_errors(substitutions: &[Diagnostic]) -> Vec<Diagnostic> {
+    let strict = |one: &Diagnostic| Diagnostic {
+        severity: Severity::Error,
+        help: Some("without --strict, this is a warning".to_owned()),
+        ..one.clone()
+    };
+    substitutions.iter().map(strict).collect()
 }
 
 /// Returns the key for a scene whose file has the given content.
 fn scene_key(
-    SceneParseRequest { path, sets, show }: SceneParseRequest<'_>,
+    SceneParseRequest { path, sets, show, foreign }: SceneParseRequest<'_>,
     content: FileContentId,
     format: Option<&ForeignFormat>,
 ) -> Fingerprint {
@@ -189,6 +221,7 @@ fn scene_key(
     });
     if format.is_some() {
         show.add_to_fingerprint(&mut key);
+        foreign.add_to_fingerprint(&mut key);
     }
     key.finish()
 }

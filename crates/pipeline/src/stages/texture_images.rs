@@ -178,6 +178,11 @@ fn decode_image(
     let (one, limits) = (image.asked_by[0], ImageLimits::default());
     let (encoding, token) = (one.source.encoding, reading.token);
     contents.1 = None;
+    if let Some(bytes) = reading.containers.generated_file(image.path()) {
+        let within = EmbeddedImage { path: image.path(), bytes };
+        let load = |progress: Progress<'_>| load_embedded(within, encoding, limits, progress, token);
+        return reading.sink.load_asset_with_progress(&one.name, load);
+    }
     let file = match one.source.image {
         None => image.path().to_owned(),
         Some(number) => {
@@ -214,7 +219,10 @@ fn locate_image_bytes(
     reading: &FileReadContext<'_>,
 ) -> Result<ImageInput, AssetError> {
     match source.image {
-        None => Ok(ImageInput::File(source.path.clone())),
+        None => Ok(match reading.containers.generated_file(&source.path) {
+            Some(bytes) => ImageInput::Bytes(bytes),
+            None => ImageInput::File(source.path.clone()),
+        }),
         Some(image) => {
             reading.containers.image_input(&source.path, image, reading.token).map(|(input, _)| input)
         }

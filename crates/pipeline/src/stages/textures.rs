@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::super::cache::{CacheOfNamedValues, EvictableCache};
+use super::super::formats::has_model_extension;
 use super::super::protocol::reasons;
 use super::super::watch::content::FilePathAndContentId;
 use super::meshes::MeshesByFileIndex;
@@ -131,6 +132,7 @@ pub(crate) fn load_textures(
     findings: &mut Findings,
     reading: &FileReadContext<'_>,
 ) -> Result<StageResult<Textures>, AbortReason> {
+    reading.add_generated_files(loaded, findings);
     let mut textures = Textures::default();
     let NeededTextures { textures: needed, left_out, are_required } = needed;
     if needed.is_empty() {
@@ -185,7 +187,7 @@ pub(crate) fn load_textures(
             Err(error) => {
                 let error = AbortReason::asset_error_unless_fatal(error)?;
                 counts.failed += 1;
-                if !are_required && loaded.is_foreign() {
+                if !are_required && loaded.is_foreign() && has_model_extension(&loaded.path) {
                     for one in &image.asked_by {
                         replace_unreadable_image(loaded, one, &error, &mut textures.images, findings);
                     }

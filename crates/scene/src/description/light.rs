@@ -6,6 +6,7 @@ use super::super::fingerprint::{FingerprintContext, FingerprintHasher, Fingerpri
 use super::Spanned;
 use crate::lights;
 pub use crate::lights::delta::Falloff;
+pub use crate::lights::infinite::MapRows;
 use crate::lights::infinite::sky::{SkyParameters, elevation};
 use crate::math::transform::rotation_xyz;
 use crate::math::{DMat3, DVec3, Vec3};
@@ -67,6 +68,8 @@ pub struct Environment {
     pub sky: Option<Sky>,
     /// Orientation of the map or the sky.
     pub orientation: MapOrientation,
+    /// Polar angles of the map's rows.
+    pub rows: MapRows,
 }
 
 /// Orientation of an environment map or a sky.
@@ -93,6 +96,8 @@ pub struct Sky {
     pub sun_scale: f32,
     /// Factor on the sky's radiance.
     pub sky_scale: f32,
+    /// Factor on the radiance of the ground.
+    pub ground_scale: f32,
 }
 
 impl Light {
@@ -175,7 +180,7 @@ impl Environment {
 impl Sky {
     /// The parameters of the model.
     pub fn parameters(&self) -> SkyParameters {
-        let Self { sun, turbidity, ground, sun_angle, sun_scale, sky_scale } = *self;
+        let Self { sun, turbidity, ground, sun_angle, sun_scale, sky_scale, ground_scale } = *self;
         SkyParameters {
             sun_elevation: elevation(sun),
             turbidity,
@@ -183,6 +188,7 @@ impl Sky {
             sun_angle: sun_angle.to_radians(),
             sun_scale,
             sky_scale,
+            ground_scale,
         }
     }
 }
@@ -211,17 +217,17 @@ impl Fingerprinted for PointLight {
 
 impl Fingerprinted for Sky {
     fn add_to_fingerprint(&self, key: &mut FingerprintHasher, _: &FingerprintContext<'_>) {
-        let Self { sun, turbidity, ground, sun_angle, sun_scale, sky_scale } = *self;
+        let Self { sun, turbidity, ground, sun_angle, sun_scale, sky_scale, ground_scale } = *self;
         key.add_dvec3(sun).add_f64(turbidity).add_vec3(ground).add_f64(sun_angle);
-        key.add_f32(sun_scale).add_f32(sky_scale);
+        key.add_f32(sun_scale).add_f32(sky_scale).add_f32(ground_scale);
     }
 }
 
 /// Covers only the lookup parameters. The texels have a separate fingerprint.
 impl Fingerprinted for Environment {
     fn add_to_fingerprint(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
-        let Self { color, file, sky, orientation } = self;
-        key.add_vec3(*color).add_bool(file.is_some());
+        let Self { color, file, sky, orientation, rows } = self;
+        key.add_vec3(*color).add_bool(file.is_some()).add_choice_name(*rows);
         match orientation {
             MapOrientation::Turn(degrees) => key.add_usize(0).add_f64(*degrees),
             MapOrientation::Rotation(DMat3 { x_axis, y_axis, z_axis }) => {

@@ -225,6 +225,8 @@ pub enum MaterialKind {
         roughness: NumberSource,
         /// Distribution of the coat's facets.
         distribution: MicrofacetDistribution,
+        /// Whether light that the coat reflects back saturates the color.
+        nonlinear: bool,
     },
     /// The glTF material model. Colors and numbers are in [0, 1], except for `ior` and `specular_color`.
     Principled {
@@ -302,9 +304,9 @@ impl Fingerprinted for MaterialKind {
                 key.add_usize(6).add(fresnel, of).add(roughness, of).add(anisotropy, of);
                 key.add_choice_name(*distribution);
             }
-            Self::Plastic { diffuse, specular, ior, roughness, distribution } => {
+            Self::Plastic { diffuse, specular, ior, roughness, distribution, nonlinear } => {
                 key.add_usize(4).add(diffuse, of).add(specular, of).add_f32(*ior).add(roughness, of);
-                key.add_choice_name(*distribution);
+                key.add_choice_name(*distribution).add_bool(*nonlinear);
             }
             Self::Principled {
                 color,

@@ -20,7 +20,7 @@ pub use camera::{
     Camera, CameraOverrides, ImageShiftAndMirror, Pose, Projection, ProjectionKind, ResolvedCamera,
     is_same_distance,
 };
-pub use light::{Environment, Light, MapOrientation, Sky};
+pub use light::{Environment, Light, MapOrientation, MapRows, Sky};
 pub use material::{
     Bump, Channel, ChannelSelector, CoatSource, ColorSource, ConductorFresnelSource, EmissionSides,
     EmissionSource, Material, MaterialKind, MicrofacetDistribution, NormalMap, NumberSource, OpacitySource,

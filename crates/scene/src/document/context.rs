@@ -1,13 +1,16 @@
 //! Context shared by all readers of a file: its source text, its path, and the issues found so far.
 
 use std::cell::{Cell, OnceCell, RefCell};
+use std::collections::BTreeMap;
 use std::ffi::OsStr;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use super::super::diagnostic::{Diagnostic, Severity};
 use super::super::report::LineIndex;
 use super::super::source::SceneText;
+use super::super::toml::GeneratedFile;
 
 /// A file that is being read.
 pub(super) struct FileContext<'a> {
@@ -18,6 +21,8 @@ pub(super) struct FileContext<'a> {
     /// Number of errors and number of warnings.
     counts: Cell<[usize; 2]>,
     searches: Cell<NameSearchCounts>,
+    /// Files that exist only in memory.
+    generated: Arc<BTreeMap<String, GeneratedFile>>,
 }
 
 /// Number of searches for similar names, and number of names compared in them.
@@ -95,8 +100,18 @@ impl Issue {
 
 impl<'a> FileContext<'a> {
     pub(super) fn new(source: SceneText, path: &'a Path) -> Self {
-        let (lines, issues, counts, searches) = Default::default();
-        Self { source, path, lines, issues, counts, searches }
+        let (lines, issues, counts, searches, generated) = Default::default();
+        Self { source, path, lines, issues, counts, searches, generated }
+    }
+
+    /// Sets the files that exist only in memory.
+    pub(super) fn with_generated_files(self, generated: Arc<BTreeMap<String, GeneratedFile>>) -> Self {
+        Self { generated, ..self }
+    }
+
+    /// Whether a file exists only in memory.
+    pub(super) fn is_generated_file(&self, name: &str) -> bool {
+        self.generated.contains_key(name)
     }
 
     /// Whether a span is in a `--set` value rather than in the file.

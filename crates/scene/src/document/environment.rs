@@ -1,10 +1,10 @@
 //! The `[environment]` table.
 
-use super::super::description::{Environment, MapOrientation, Scene, Sky};
+use super::super::description::{Environment, MapOrientation, MapRows, Scene, Sky};
 use super::super::keys::endings::MAPS;
 use super::super::keys::key::DefaultValue::{Absent, By, Is, Required};
-use super::super::keys::key::ValueKind::{Color, File, InlineTable, Number, Rotation};
-use super::super::keys::key::{COLOR, DIRECTION, KeyInfo, TableInfo, TableSyntax, keys};
+use super::super::keys::key::ValueKind::{Color, File, InlineTable, Number, Rotation, Words};
+use super::super::keys::key::{COLOR, DIRECTION, KeyInfo, TableInfo, TableSyntax, choice_values, keys};
 use super::context::Issue;
 use super::key::KeyInTable;
 use super::limits::Limits::{Any, AtLeast, Between};
@@ -21,6 +21,9 @@ pub(crate) static ENVIRONMENT: TableInfo = TableInfo::new(
         /// An equirectangular map. Its center is toward −z, the middle of its right half toward +x, and its
         /// top row toward +y.
         file: File(MAPS), Absent;
+        /// Polar angles of the map's rows: `"centers"`, or `"poles"` if the first and the last row are at the
+        /// poles, as in Mitsuba.
+        rows: Words(choice_values::<MapRows>), Is("\"centers\"");
         /// A clear sky with a sun.
         sky: InlineTable(SKY), Absent;
         /// Rotation of the map or the sky about +y, counterclockwise seen from above.
@@ -46,6 +49,8 @@ const SKY: &[KeyInfo] = keys! {
     sun_scale: Number(AtLeast(0.0)), Is("1.0");
     /// Factor on the sky's radiance; 0 removes the sky.
     sky_scale: Number(AtLeast(0.0)), Is("1.0");
+    /// Factor on the light from the ground below the horizon; 0 makes it black.
+    ground_scale: Number(AtLeast(0.0)), Is("1.0");
 };
 
 /// Reads the environment. Returns `None` if it is invalid, and `Some(None)` if it is absent.
@@ -66,6 +71,7 @@ pub(super) fn read_environment(root: &TableReader<'_>) -> Option<Option<Environm
     } else {
         rotate.number().map(MapOrientation::Turn)
     };
+    let rows = table.key("rows").choice::<MapRows>();
     table.report_unknown_and_missing_keys();
     if let (Some(Vec3::ZERO), Some(span)) = (radiance, color.value_span().filter(|_| file.is_present())) {
         let issue = Issue::warning(span, "`color` is black, so the environment is black")
@@ -80,7 +86,13 @@ pub(super) fn read_environment(root: &TableReader<'_>) -> Option<Option<Environm
             table.context.report(issue.with_help(help));
         }
     }
-    Some(Some(Environment { color: radiance?, file: map?, sky: clear_sky?, orientation: orientation? }))
+    Some(Some(Environment {
+        color: radiance?,
+        file: map?,
+        sky: clear_sky?,
+        orientation: orientation?,
+        rows: rows?,
+    }))
 }
 
 /// Reads the sky. The `replaced` keys must be absent.
@@ -95,7 +107,8 @@ fn read_sky(key: &KeyInTable<'_>, replaced: [&KeyInTable<'_>; 2]) -> Option<Sky>
     let sun_key = table.key("sun");
     let sun = sun_key.nonzero_direction("sun").map(DVec3::normalize);
     let [turbidity, sun_angle] = ["turbidity", "sun_angle"].map(|name| table.key(name).number());
-    let [sun_scale, sky_scale] = ["sun_scale", "sky_scale"].map(|name| table.key(name).number_f32());
+    let [sun_scale, sky_scale, ground_scale] =
+        ["sun_scale", "sky_scale", "ground_scale"].map(|name| table.key(name).number_f32());
     let ground = table.key("ground").color();
     table.report_unknown_and_missing_keys();
     if sun.is_some_and(|sun| sun.y <= 0.0) {
@@ -111,6 +124,7 @@ fn read_sky(key: &KeyInTable<'_>, replaced: [&KeyInTable<'_>; 2]) -> Option<Sky>
         sun_angle: sun_angle?,
         sun_scale: sun_scale?,
         sky_scale: sky_scale?,
+        ground_scale: ground_scale?,
     })
 }
 

@@ -92,6 +92,9 @@ table_types! {
         roughness: FRACTION, Is("0.1");
         /// Distribution of the coat's facets.
         distribution: Words(choice_values::<MicrofacetDistribution>), Is("\"ggx\"");
+        /// Whether light that the coat reflects back to the base makes its color more saturated; otherwise,
+        /// the reflectance is proportional to `diffuse`.
+        nonlinear: Flag, Is("true");
     }
     /// The glTF material model.
     Principled = "principled" {
@@ -374,6 +377,7 @@ impl<'a> MaterialReader<'a> {
             ior: self.constant("ior"),
             roughness,
             distribution: self.read_distribution(roughness),
+            nonlinear: self.key("nonlinear").boolean().unwrap_or(true),
         }
     }
 

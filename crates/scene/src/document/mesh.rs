@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::super::description::{MeshReference, Shape, Spanned};
-use super::super::keys::endings::{GLTF, MESHES};
+use super::super::keys::endings::{MESHES, PARTS};
 use super::super::keys::key::DefaultValue::{Absent, By, Is, Required};
 use super::super::keys::key::ValueKind::{File, Flag, Numbers, Scale, Whole};
 use super::super::keys::key::{ANGLES, MAX_INTEGER};
@@ -16,11 +16,11 @@ use super::transform::read_transform;
 shape_table! {
     /// A triangle mesh from a file.
     pub(super) const MESH = "mesh", read_mesh, material: By("the file's");
-    /// An OBJ (with MTL), OFF, PLY, STL or glTF (.glb, .gltf) file; the extension determines the
-    /// format.
+    /// An OBJ (with MTL), OFF, PLY, STL, Mitsuba (.serialized) or glTF (.glb, .gltf) file; the extension
+    /// determines the format.
     file: File(MESHES), Required("\"mesh.obj\"");
-    /// Index of a primitive in a glTF file, counted across all meshes. Without this key, the mesh is
-    /// the file's whole scene.
+    /// Index of a primitive in a glTF file, counted across all meshes, or of a mesh in a .serialized file.
+    /// Without this key, the mesh is the file's whole scene.
     part: Whole(0, MAX_INTEGER), Absent;
     /// Number of levels of Loop subdivision. Each level splits every triangle into four; vertices are moved
     /// to the smooth limit surface.
@@ -53,8 +53,8 @@ fn read_part_index(table: &TableReader<'_>, file: Option<&Spanned<PathBuf>>) -> 
     let Some(span) = key.value_span() else { return Some(None) };
     let number = key.integer().map(Some);
     let ending = file.and_then(|file| file.value.extension()).unwrap_or_default().to_ascii_lowercase();
-    if file.is_some() && !GLTF.iter().any(|known| ending == *known) {
-        key.context.report(Issue::error(span, "`part` needs a .glb or .gltf file"));
+    if file.is_some() && !PARTS.iter().any(|known| ending == *known) {
+        key.context.report(Issue::error(span, "`part` needs a .serialized, .glb or .gltf file"));
         return None;
     }
     number

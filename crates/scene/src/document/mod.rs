@@ -25,12 +25,13 @@ mod value;
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use super::description::{Camera, Environment, Light, Scene};
 use super::keys::limits;
 use super::other_content::NEW_SCENE_HELP;
 use super::source::SceneText;
-use super::toml::Document;
+use super::toml::{Document, SceneDocumentBuilder};
 use super::{MAX_FILE_BYTES, ParseOutcome, SettingSpan, facing, toml};
 use crate::math::Vec3;
 use context::{FileContext, Issue};
@@ -72,8 +73,9 @@ pub(super) fn parse_and_lower(source: &SceneText, path: &Path) -> ParseOutcome {
 }
 
 /// Validates a document that was built in memory.
-pub(super) fn lower_built(source: &SceneText, document: &Document<'static>, path: &Path) -> ParseOutcome {
-    let context = FileContext::new(source.clone(), path);
+pub(super) fn lower_built(source: &SceneText, built: &SceneDocumentBuilder, path: &Path) -> ParseOutcome {
+    let document = &built.document;
+    let context = FileContext::new(source.clone(), path).with_generated_files(Arc::clone(&built.generated));
     let is_overridden = source.override_arg_offsets().next().is_some();
     let overridden = is_overridden.then(|| sets::apply_set_args(&context, source, document.clone()));
     lower(context, overridden.as_ref().unwrap_or(document), &[])

@@ -19,4 +19,7 @@ pub const MAPS: &[&str] = READ.split_at(13).0;
 pub const GLTF: &[&str] = READ.split_at(13).1;
 
 /// Extensions of mesh formats.
-pub const MESHES: &[&str] = &["obj", "off", "ply", "stl", "glb", "gltf"];
+pub const MESHES: &[&str] = &["obj", "off", "ply", "stl", "serialized", "glb", "gltf"];
+
+/// Extensions of mesh formats with numbered parts.
+pub const PARTS: &[&str] = MESHES.split_at(4).1;

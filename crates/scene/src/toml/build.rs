@@ -1,12 +1,14 @@
 //! Documents built in memory by the importers of foreign formats.
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 
 use super::tree::{Document, Name, NodeKind, Span, TableId, TableOrigin, ValueNode};
 use super::write::{Comment, format_document};
 use crate::math::DVec3;
+use crate::source::{SourceFile, SourceFiles};
 
 /// A scene document built in memory: the tables and keys of a scene file, and comments.
 ///
@@ -17,11 +19,24 @@ pub struct SceneDocumentBuilder {
     pub(crate) document: Document<'static>,
     /// The text of the foreign file, into which all spans index.
     pub(crate) source: Arc<str>,
+    /// The files of which the source consists. Empty if it is a single file.
+    pub(crate) files: Arc<[SourceFile]>,
+    /// Meshes and images that exist only in memory, by the value of the key `file`.
+    pub(crate) generated: Arc<BTreeMap<String, GeneratedFile>>,
     comments: Vec<Comment>,
     /// The current table.
     table: TableId,
     /// The span of the values added next.
     span: Span,
+}
+
+/// A mesh or an image that an importer has generated. The extension of its name determines its format.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct GeneratedFile {
+    /// The content of the file.
+    pub bytes: Arc<[u8]>,
+    /// BLAKE3 hash of the bytes.
+    pub hash: [u8; 32],
 }
 
 /// A value in a [`SceneDocumentBuilder`].
@@ -91,7 +106,37 @@ impl SceneDocumentBuilder {
     /// Creates an empty document. `source` is the text of the foreign file, or empty if the file is not text.
     pub fn new(source: Arc<str>) -> Self {
         let (comments, span) = Default::default();
-        Self { document: Document::new(""), source, comments, table: Document::ROOT, span }
+        Self {
+            document: Document::new(""),
+            source,
+            files: Arc::new([]),
+            generated: Arc::default(),
+            comments,
+            table: Document::ROOT,
+            span,
+        }
+    }
+
+    /// Creates an empty document for a foreign scene that consists of several text files.
+    pub fn from_files(files: SourceFiles) -> Self {
+        let (source, files) = files.into_parts();
+        Self { files, ..Self::new(source) }
+    }
+
+    /// Adds a file that exists only in memory. The key `file` refers to it by `name`.
+    pub fn add_generated_file(&mut self, name: String, file: GeneratedFile) {
+        Arc::make_mut(&mut self.generated).insert(name, file);
+    }
+
+    /// The files that exist only in memory, by name.
+    pub fn generated_files(&self) -> &Arc<BTreeMap<String, GeneratedFile>> {
+        &self.generated
+    }
+
+    /// Sets the files of a foreign scene that consists of several text files. All spans, including those of
+    /// values added before, index into their concatenated texts.
+    pub fn attach_files(&mut self, files: SourceFiles) {
+        (self.source, self.files) = files.into_parts();
     }
 
     /// Sets the span in the foreign text of all tables and values added from now on. Errors underline it.
@@ -123,10 +168,14 @@ impl SceneDocumentBuilder {
 
     /// Starts a table `[[list]]`.
     pub fn start_list_table(&mut self, list: &'static str) {
-        let found = self.document.find_in_table(Document::ROOT, list).map(|found| found.kind);
+        self.list_table_in(Document::ROOT, list);
+    }
+
+    fn list_table_in(&mut self, parent: TableId, list: &'static str) {
+        let found = self.document.find_in_table(parent, list).map(|found| found.kind);
         let kind = found.unwrap_or_else(|| {
             let kind = self.document.add_table_list();
-            self.add_entry(Document::ROOT, list.into(), kind);
+            self.add_entry(parent, list.into(), kind);
             kind
         });
         self.table = self.document.add_table(TableOrigin::default());
@@ -134,6 +183,13 @@ impl SceneDocumentBuilder {
             let node = ValueNode { span: self.span, kind: NodeKind::Table(self.table) };
             self.document.table_list_mut(list).push(node);
         }
+    }
+
+    /// Starts a table `[[groups.group.list]]`.
+    pub fn group_list_table(&mut self, group: &str, list: &'static str) {
+        self.start_named_table("groups", group);
+        let parent = self.table;
+        self.list_table_in(parent, list);
     }
 
     /// Adds a key, which must be new, to the current table.

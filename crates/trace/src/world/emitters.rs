@@ -13,7 +13,7 @@ use crate::geometry::Shape;
 use crate::lights::MeshEmitter;
 use crate::lights::infinite::sky::sun::OrientedSunDisk;
 use crate::lights::infinite::sky::{Sky, SkyFrame};
-use crate::lights::infinite::{DirectionalLight, Environment, EnvironmentMap, MapOrientation};
+use crate::lights::infinite::{DirectionalLight, Environment, EnvironmentMap, MapOrientation, MapRows};
 use crate::lights::{
     AreaLight, BlendWeight, BoundingSphere, EmissionModulation, EmissionTerm, Light, LightBounds, Lights,
     PhotonEmitter, Side, TriangleWithUvs, UvMapping, back_area_light, front_area_light,
@@ -27,8 +27,8 @@ use crate::math::transform::Transform;
 use crate::scene::description::{self, MaterialKind, Scene};
 
 /// Sampling tables for the environment map, or `None` if the image is black.
-pub fn build_environment_map(texels: &Arc<Texels>) -> Option<Arc<EnvironmentMap>> {
-    EnvironmentMap::new(Arc::clone(texels)).map(Arc::new)
+pub fn build_environment_map(texels: &Arc<Texels>, rows: MapRows) -> Option<Arc<EnvironmentMap>> {
+    EnvironmentMap::with_rows(Arc::clone(texels), rows).map(Arc::new)
 }
 
 /// Evaluates the environment's sky.
@@ -105,7 +105,7 @@ fn environment_lights(
     if !environment.has_emission() {
         return Vec::new();
     }
-    let description::Environment { color, file, sky, orientation } = environment;
+    let description::Environment { color, file, sky, orientation, rows: _ } = environment;
     match (sky, file, source) {
         (Some(sky), _, Some(EnvironmentSource::Sky(Sky { dome, sun }))) => {
             let rotation = environment.rotation();

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::Images;
-use super::lower::{add_coat_to_lobes, lower_plastic};
+use super::lower::{PlasticCoat, add_coat_to_lobes, lower_plastic};
 use super::lower_texture::lower_file_texture;
 use super::textures::{FILE_NUMBER, color_or_cutout_interpretation, opacity_pixel_interpretation};
 use crate::assets::{FileMaterial, FileMaterialKind, FileTexture, PhysicalMaterial};
@@ -127,7 +127,8 @@ fn file_material_mirror_over_diffuse(images: &Images, own: &FileMaterial) -> Bsd
         file_material_color_parameter(images, own, own.diffuse_texture.as_ref(), own.diffuse.min(Vec3::ONE));
     let tint = ColorOrTexture::Constant(specular / specular.max_element());
     let (roughness, ior) = (ScalarParameter::Constant(0.0), (1.0 + root) / (1.0 - root));
-    lower_plastic(diffuse, tint, roughness, ior, MicrofacetDistribution::Ggx)
+    let coat = PlasticCoat { ior, distribution: MicrofacetDistribution::Ggx, is_base_linear: false };
+    lower_plastic(diffuse, tint, roughness, coat)
 }
 
 fn file_material_phong(images: &Images, own: &FileMaterial) -> NonSpecular {

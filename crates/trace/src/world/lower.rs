@@ -29,8 +29,9 @@ pub fn lower_material(scene: &Scene, images: &Images, material: &description::Ma
         MaterialKind::Metal { fresnel, roughness, anisotropy, distribution } => {
             lower_metal(lower_fresnel(fresnel, color), number(roughness), number(anisotropy), *distribution)
         }
-        MaterialKind::Plastic { diffuse, specular, ior, roughness, distribution } => {
-            lower_plastic(color(diffuse), color(specular), number(roughness), *ior, *distribution)
+        MaterialKind::Plastic { diffuse, specular, ior, roughness, distribution, nonlinear } => {
+            let coat = PlasticCoat { ior: *ior, distribution: *distribution, is_base_linear: !nonlinear };
+            lower_plastic(color(diffuse), color(specular), number(roughness), coat)
         }
         MaterialKind::Principled {
             color: base,
@@ -135,16 +136,27 @@ fn lower_metal(
     })
 }
 
+/// Constants of plastic.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PlasticCoat {
+    /// Index of refraction of the coat.
+    pub(super) ior: f32,
+    /// Distribution of the coat's facets.
+    pub(super) distribution: MicrofacetDistribution,
+    /// Whether the base's reflectance is proportional to its color.
+    pub(super) is_base_linear: bool,
+}
+
 /// Converts plastic. With roughness 0, the coat becomes a δ lobe over the diffuse base.
 pub(super) fn lower_plastic(
     diffuse: ColorOrTexture,
     specular: ColorOrTexture,
     roughness: ScalarParameter,
-    ior: f32,
-    distribution: MicrofacetDistribution,
+    PlasticCoat { ior, distribution, is_base_linear }: PlasticCoat,
 ) -> Bsdf {
     let is_smooth = roughness.as_untextured() == Some(0.0);
     let base = Plastic::new(diffuse, specular.clone(), roughness, ior, distribution);
+    let base = if is_base_linear { base.with_linear_base() } else { base };
     if is_smooth {
         let specular = SpecularLayer::SmoothCoat { tint: specular, ior };
         return Bsdf::SpecularOverBase(SpecularOverBase {

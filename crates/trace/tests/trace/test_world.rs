@@ -9,8 +9,8 @@ use crate::geometry::mesh::TriangleMesh;
 use crate::materials::texels::Texels;
 use crate::math::{DVec3, Vec3};
 use crate::scene::description::{
-    Accel, Environment, MapOrientation, MeshFile, MeshReference, Object, ObjectTransform, Scene, Shape,
-    Spanned,
+    Accel, Environment, MapOrientation, MapRows, MeshFile, MeshReference, Object, ObjectTransform, Scene,
+    Shape, Spanned,
 };
 use crate::world::{
     EnvironmentSource, Geometry, Images, MeshTree, World, WorldInputs, build_environment_map, build_lights,
@@ -63,8 +63,8 @@ impl TestWorldBuilder {
     /// Adds an environment map.
     pub fn sky(mut self, texels: &Arc<Texels>) -> Self {
         let file = Some(Spanned { value: PathBuf::from("sky.exr"), span: 0..0 });
-        self.scene.environment =
-            Some(Environment { color: Vec3::ONE, file, sky: None, orientation: MapOrientation::Turn(0.0) });
+        let (orientation, rows) = (MapOrientation::Turn(0.0), MapRows::Centers);
+        self.scene.environment = Some(Environment { color: Vec3::ONE, file, sky: None, orientation, rows });
         self.sky = Some(Arc::clone(texels));
         self
     }
@@ -75,7 +75,12 @@ impl TestWorldBuilder {
         let geometry = Geometry::from_scene(scene, &self.meshes, DVec3::ZERO, &token);
         let geometry = Arc::new(geometry.expect("never canceled"));
         let sky = scene.environment.as_ref().and_then(|environment| environment.sky.as_ref());
-        let map = || self.sky.as_ref().and_then(build_environment_map).map(EnvironmentSource::Map);
+        let map = || {
+            self.sky
+                .as_ref()
+                .and_then(|texels| build_environment_map(texels, MapRows::Centers))
+                .map(EnvironmentSource::Map)
+        };
         let sky = sky.map(|sky| EnvironmentSource::Sky(build_sky(sky))).or_else(map);
         let lights = build_lights(scene, &geometry, &Images::new(), sky, &token).expect("never canceled");
         World::new(scene, &WorldInputs { meshes: self.meshes, ..WorldInputs::default() }, geometry, lights)

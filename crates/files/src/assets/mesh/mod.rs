@@ -13,6 +13,7 @@ pub mod ply;
 mod polygon;
 #[cfg(test)]
 mod polygon_tests;
+pub mod serialized;
 mod stl;
 pub mod subdivide;
 mod text;
@@ -44,22 +45,48 @@ pub const EXTENSIONS: [&str; 4] = ["obj", "off", "ply", "stl"];
 ///   usable face.
 /// - [`AssetError::Canceled`].
 pub fn load(path: &Path, progress: Progress<'_>, token: &CancelToken) -> Result<LoadedMesh, AssetError> {
+    let (parse, read) = parse_and_read_functions(path)?;
+    let monitor = Monitor { progress, token };
+    parse_bytes(path, &read(path, FILE_LIMIT, monitor)?, parse, monitor)
+}
+
+/// Like [`load`], for the bytes of a file that need not exist.
+///
+/// # Errors
+/// Same as [`load`].
+pub fn load_from_bytes(
+    path: &Path,
+    bytes: &[u8],
+    progress: Progress<'_>,
+    token: &CancelToken,
+) -> Result<LoadedMesh, AssetError> {
+    parse_bytes(path, bytes, parse_and_read_functions(path)?.0, Monitor { progress, token })
+}
+
+/// Returns the functions for the format that the extension determines.
+fn parse_and_read_functions(path: &Path) -> Result<(ParseFn, ReadBytesFn), AssetError> {
     let extension =
         path.extension().map(|extension| extension.to_string_lossy().to_lowercase()).unwrap_or_default();
-    let (parse, read): (ParseFn, ReadBytesFn) = match extension.as_str() {
-        "obj" => (obj::parse, read::read_text),
-        "off" => (off::parse, read::read_unless_zeros_in_magic),
-        "ply" => (ply::parse, read::read_unless_zeros_in_magic),
-        "stl" => (stl::parse, read::read_unless_zeros_at_start),
-        _ => return Err(AssetError::unreadable(path, UNKNOWN_FORMAT)),
-    };
-    let monitor = Monitor { progress, token };
-    let bytes = read(path, FILE_LIMIT, monitor)?;
-    let source = MeshFileBytes { path, bytes: text::strip_byte_order_mark(&bytes), monitor };
+    match extension.as_str() {
+        "obj" => Ok((obj::parse, read::read_text)),
+        "off" => Ok((off::parse, read::read_unless_zeros_in_magic)),
+        "ply" => Ok((ply::parse, read::read_unless_zeros_in_magic)),
+        "stl" => Ok((stl::parse, read::read_unless_zeros_at_start)),
+        _ => Err(AssetError::unreadable(path, UNKNOWN_FORMAT)),
+    }
+}
+
+fn parse_bytes(
+    path: &Path,
+    bytes: &[u8],
+    parse: ParseFn,
+    monitor: Monitor<'_>,
+) -> Result<LoadedMesh, AssetError> {
+    let source = MeshFileBytes { path, bytes: text::strip_byte_order_mark(bytes), monitor };
     if source.bytes.is_empty() {
         return Err(source.malformed_error_without_line(EMPTY_FILE));
     }
-    let loaded = LoadedMesh { hash: read::hash_bytes(&bytes), ..parse(&source)? };
+    let loaded = LoadedMesh { hash: read::hash_bytes(bytes), ..parse(&source)? };
     monitor.report_and_check_cancel(2 * bytes.len(), 2 * bytes.len())?;
     Ok(loaded)
 }

@@ -3,6 +3,7 @@
 use std::f32::consts::PI;
 use std::sync::Arc;
 
+use crate::choice;
 use crate::materials::texels::Texels;
 use crate::math::color::luminance;
 use crate::math::elementary::{atan2, sin_cos};
@@ -10,6 +11,26 @@ use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, set_lane};
 use crate::math::{DVec3, Vec3};
 use crate::sampling::piecewise_constant::{GridSample, PiecewiseConstant2D};
 use crate::sampling::warp;
+
+choice! {
+    /// Polar angles of the rows of an environment map.
+    pub enum MapRows {
+        /// Rows are centered between the poles: half a row is above the first one.
+        Centers = "centers",
+        /// The first and the last row are at the poles, as in Mitsuba.
+        Poles = "poles",
+    }
+}
+
+impl MapRows {
+    /// Number of rows per half turn, and the coordinate of the first row below the pole +y.
+    fn scale_and_offset(self, rows: u32) -> (f32, f32) {
+        match self {
+            Self::Poles if rows > 1 => (rows as f32 - 1.0, 1.0),
+            Self::Poles | Self::Centers => (rows as f32, 0.5),
+        }
+    }
+}
 
 /// An environment map and its sampling distribution. The top row is at +y, the image center at −z, and the
 /// right quarter at +x. Colors are interpolated between texel centers. A cell is the area between four texel
@@ -20,6 +41,8 @@ use crate::sampling::warp;
 pub struct EnvironmentMap {
     texels: Arc<Texels>,
     cells: PiecewiseConstant2D,
+    /// Polar angles of the rows.
+    rows: MapRows,
     /// Cosines of the polar angles at the tops of the rows of cells, followed by −1.
     heights: Vec<f64>,
     /// Probability of each row divided by the solid angle of one of its cells, in sr⁻¹.
@@ -42,11 +65,18 @@ struct TexelPosition {
 impl EnvironmentMap {
     /// Creates a map from nonnegative texels. Returns `None` if all texels are black.
     pub fn new(texels: Arc<Texels>) -> Option<Self> {
+        Self::with_rows(texels, MapRows::Centers)
+    }
+
+    /// Creates a map from nonnegative texels whose rows have the given polar angles. Returns `None` if all
+    /// texels are black.
+    pub fn with_rows(texels: Arc<Texels>, map_rows: MapRows) -> Option<Self> {
         let (columns, rows) = (texels.width as usize, texels.height as usize);
+        let (scale, offset) = map_rows.scale_and_offset(texels.height);
         let height = |row: usize| match row {
             0 => 1.0,
             row if row > rows => -1.0,
-            row => libm::cos((row as f64 - 0.5) * std::f64::consts::PI / rows as f64),
+            row => libm::cos((row as f64 - f64::from(offset)) * std::f64::consts::PI / f64::from(scale)),
         };
         let heights: Vec<f64> = (0..=rows + 1).map(height).collect();
         let luminances = |row: usize| -> Vec<f64> {
@@ -65,12 +95,13 @@ impl EnvironmentMap {
         let cells = PiecewiseConstant2D::new(columns, weights)?;
         let density = |row: usize| {
             let extent = 2.0 * std::f64::consts::PI / columns as f64 * (heights[row] - heights[row + 1]);
-            (f64::from(cells.row_probability(row)) / extent) as f32
+            // Rows at the poles have no extent above or below them.
+            if extent > 0.0 { (f64::from(cells.row_probability(row)) / extent) as f32 } else { 0.0 }
         };
         let pdfs = (0..=rows).map(density).collect();
         // Each row of cells is between two rows of texels, and the heights range from 1 to −1.
         let mean_luminance = sum / (4.0 * columns as f64);
-        Some(Self { texels, cells, heights, pdfs, mean_luminance })
+        Some(Self { texels, cells, rows: map_rows, heights, pdfs, mean_luminance })
     }
 
     /// Mean luminance over all directions.
@@ -81,8 +112,10 @@ impl EnvironmentMap {
     /// Mean color over all directions. Between row centers, colors depend linearly on the polar angle.
     pub fn mean(&self) -> Vec3 {
         let rows = self.texels.height;
-        let step = std::f64::consts::PI / f64::from(rows);
-        let (sin, cos) = (|row: f64| libm::sin((row + 0.5) * step), |row: f64| libm::cos((row + 0.5) * step));
+        let (scale, offset) = self.rows.scale_and_offset(rows);
+        let (step, first) = (std::f64::consts::PI / f64::from(scale), 1.0 - f64::from(offset));
+        let (sin, cos) =
+            (|row: f64| libm::sin((row + first) * step), |row: f64| libm::cos((row + first) * step));
         let of_row = |row: u32| {
             let sum: DVec3 = (0..self.texels.width).map(|x| self.texels.get(x, row).as_dvec3()).sum();
             let at = f64::from(row);
@@ -155,7 +188,8 @@ impl EnvironmentMap {
         let turns = (column + 0.5 + along) / self.texels.width as f32 - 0.5 - turn;
         let (sin, cos) = sin_cos(2.0 * PI * turns);
         let direction = Vec3::new(across * sin, y as f32, -across * cos);
-        let down = atan2(across, y as f32) * (1.0 / PI) * self.texels.height as f32 + 0.5 - row;
+        let (scale, offset) = self.rows.scale_and_offset(self.texels.height);
+        let down = atan2(across, y as f32) * (1.0 / PI) * scale + offset - row;
         (direction, down.max(0.0).min(1.0))
     }
 
@@ -233,12 +267,13 @@ impl EnvironmentMap {
     /// Cell coordinates of a unit direction.
     #[inline(always)]
     fn cell_coordinates(&self, direction: Vec3, turn: f32) -> (f32, f32) {
-        let (width, height) = (self.texels.width as f32, self.texels.height as f32);
+        let (width, (scale, offset)) =
+            (self.texels.width as f32, self.rows.scale_and_offset(self.texels.height));
         let turns = 0.5 + atan2(direction.x, -direction.z) * (0.5 / PI) + turn;
         let x = (turns - turns.floor()) * width - 0.5;
         let x = if x < 0.0 { x + width } else { x };
         let across = (direction.x * direction.x + direction.z * direction.z).sqrt();
-        (x, atan2(across, direction.y) * (1.0 / PI) * height + 0.5)
+        (x, atan2(across, direction.y) * (1.0 / PI) * scale + offset)
     }
 
     /// Column and row of a cell from cell coordinates.

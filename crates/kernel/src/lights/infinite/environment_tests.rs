@@ -1,6 +1,7 @@
 use std::f64::consts::{PI, TAU};
 
 use super::*;
+use crate::lights::infinite::MapRows;
 use crate::materials::texels::{TexelData, Texels};
 use crate::math::{DMat3, DVec3};
 use crate::sampling::{Dimension, PixelSampler};
@@ -118,6 +119,33 @@ fn rotated_maps_move_with_their_axes() {
         let [turned, rotated] =
             [&turned, &rotated].map(|environment| environment.radiance_and_pdf(direction).0);
         assert!((turned - rotated).length() < 1e-2, "{direction}: {turned} {rotated}");
+    }
+}
+
+/// With rows at the poles, a map that is linear in the row is linear in the polar angle.
+#[test]
+fn rows_at_the_poles_are_interpolated_exactly() {
+    for height in [2, 3, 17] {
+        let texels = texels_from_fn(8, height, |_, y| Vec3::splat(y as f32 / (height - 1) as f32));
+        let map = EnvironmentMap::with_rows(texels, MapRows::Poles).expect("light");
+        for direction in random_directions(500) {
+            let (color, _) = map.lookup_color_and_pdf(direction, 0.0);
+            let expected = (f64::from(direction.y).clamp(-1.0, 1.0).acos() / PI) as f32;
+            assert!((color.x - expected).abs() < 2e-5, "{direction}: {} {expected}", color.x);
+        }
+        assert!((map.mean().x - 0.5).abs() < 1e-5, "{}", map.mean());
+        let (mut sum, count) = (0.0, 20_000);
+        for i in 0..count {
+            let (direction, color, pdf) = map.sample(random_pair(i), 0.25);
+            let (looked_up, same_pdf) = map.lookup_color_and_pdf(direction, 0.25);
+            assert!(
+                (color - looked_up).length() < 1e-3 && (pdf / same_pdf - 1.0).abs() < 1e-2,
+                "{direction}"
+            );
+            sum += f64::from(color.x / pdf);
+        }
+        // ∫ θ/π dω = 2π.
+        assert!((sum / f64::from(count) / TAU - 1.0).abs() < 0.02, "{}", sum / f64::from(count));
     }
 }
 

@@ -111,6 +111,7 @@ fn sky_and_sun() -> (Light, Light) {
         sun_angle: 10_f64.to_radians(),
         sun_scale: 1.0,
         sky_scale: 1.0,
+        ground_scale: 1.0,
     };
     let (sky, frame) = (Sky::new(&parameters), SkyFrame::new(DVec3::new(-0.6, 0.8, 0.0), DVec3::Y));
     let disk = OrientedSunDisk { disk: sky.sun.expect("a sun"), up: Vec3::Y };

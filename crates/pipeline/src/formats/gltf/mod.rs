@@ -7,6 +7,7 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use self::materials::{MaterialBuilder, TextureFileReference};
+use super::foreign::ForeignError;
 use super::frame::{CameraPose, FOV, frame_model, round_to_decimals_of_step};
 use super::model::{
     DEFAULT_SIZE, Lighting, ModelViewOptions, POLISHED_ROUGHNESS, UsedNames, add_camera, add_ground,
@@ -47,10 +48,10 @@ enum GltfPartOrImage {
 }
 
 /// Reads a glTF file.
-pub(super) fn read(path: &Path, context: &ForeignReadContext<'_>) -> Result<ForeignScene, AssetError> {
+pub(super) fn read(path: &Path, context: &ForeignReadContext<'_>) -> Result<ForeignScene, ForeignError> {
     if context.view.up.is_some_and(|up| up != UpAxis::Y) {
         let reason = "glTF files are always y-up; `--up` applies to obj, off, ply and stl";
-        return Err(AssetError::malformed(path, None, reason));
+        return Err(AssetError::malformed(path, None, reason).into());
     }
     let (scene, _) = scene_of_file(path, &SceneAssetLocation::Inside, context)?;
     Ok(scene)
@@ -61,7 +62,7 @@ pub(super) fn convert(
     path: &Path,
     folder: &str,
     context: &ForeignReadContext<'_>,
-) -> Result<ImportedScene, AssetError> {
+) -> Result<ImportedScene, ForeignError> {
     let &ForeignReadContext { containers, token, .. } = context;
     let (ForeignScene { document, substitutions, .. }, assets) =
         scene_of_file(path, &SceneAssetLocation::Folder(folder), context)?;
@@ -87,12 +88,12 @@ pub(super) fn convert(
 
 /// Rejects a file that `glimt check` would reject. Checks the scene that `glimt MODEL` would render instead of
 /// the imported one, whose texture files have not been written yet.
-fn check_scene_before_import(path: &Path, context: &ForeignReadContext<'_>) -> Result<(), AssetError> {
+fn check_scene_before_import(path: &Path, context: &ForeignReadContext<'_>) -> Result<(), ForeignError> {
     let errors = scene_from_document(read(path, context)?.document, path, &[]).err();
     // Ignore errors about file names, because the imported scene uses different file names.
     let is_relevant = |one: &Diagnostic| one.severity == Severity::Error && !one.message.contains("`file`");
     let first = errors.into_iter().flatten().find(is_relevant);
-    first.map_or(Ok(()), |error| Err(AssetError::malformed(path, None, error.message)))
+    first.map_or(Ok(()), |error| Err(AssetError::malformed(path, None, error.message).into()))
 }
 
 /// Generates the scene for a glTF file. Also returns the names and contents of the files that the scene
@@ -100,7 +101,7 @@ fn check_scene_before_import(path: &Path, context: &ForeignReadContext<'_>) -> R
 fn scene_of_file(
     path: &Path,
     asset_location: &SceneAssetLocation<'_>,
-    &ForeignReadContext { view, containers, token }: &ForeignReadContext<'_>,
+    &ForeignReadContext { view, containers, token, .. }: &ForeignReadContext<'_>,
 ) -> Result<(ForeignScene, Vec<(String, GltfPartOrImage)>), AssetError> {
     let container = containers.open(path, &ignore_progress, token)?;
     let scene = container.convert_scene(token)?;

@@ -36,6 +36,9 @@ impl KeyInTable<'_> {
             return None;
         }
         let path = self.context.resolve_path(text);
+        if self.context.is_generated_file(text) {
+            return Some(Spanned { value: path, span });
+        }
         let may_be_meant = |found: &Path| {
             endings.is_empty() || endings.contains(&lowercase_extension(&found.to_string_lossy()).as_str())
         };

@@ -115,7 +115,7 @@ impl SkyDome {
         }
         let solid_angle = 2.0 * std::f64::consts::PI / (COLUMNS * ROWS) as f64;
         let lit = (irradiance * solid_angle + sun_irradiance) / std::f64::consts::PI;
-        let ground = (parameters.ground.as_dvec3() * lit).as_vec3();
+        let ground = (parameters.ground.as_dvec3() * lit * f64::from(parameters.ground_scale)).as_vec3();
         // Unless the sky is black, any cell may contain light, even if its Gauss points are black.
         let least = luminances.iter().sum::<f64>() / luminances.len() as f64 * 1e-3;
         let dome = luminances.chunks(COLUMNS).map(|row| row.iter().map(|one| one.max(least)).collect());

@@ -26,6 +26,8 @@ pub struct SkyParameters {
     pub sun_scale: f32,
     /// Factor on the sky's radiance.
     pub sky_scale: f32,
+    /// Factor on the radiance of the ground.
+    pub ground_scale: f32,
 }
 
 /// The parameters A, B, C, D, E, F, G, I, H of the distribution of one channel, in the order of the published

@@ -14,6 +14,7 @@ fn parameters(turbidity: f64, degrees: f64, ground: [f32; 3]) -> SkyParameters {
         sun_angle: SUN_ANGLE_DEGREES.to_radians(),
         sun_scale: 1.0,
         sky_scale: 1.0,
+        ground_scale: 1.0,
     }
 }
 
@@ -256,4 +257,19 @@ fn pdfs_integrate_to_one() {
     let below = f64::from(dome.radiance_and_pdf(&frame, Vec3::NEG_Y).1) * TAU;
     let total = over_sky(pdf).x + below;
     assert!((total - 1.0).abs() < 2e-3, "{total}");
+}
+
+#[test]
+fn ground_scale_changes_only_the_ground() {
+    let usual = parameters(3.0, 40.0, [0.3; 3]);
+    let of = |ground_scale: f32| Sky::new(&SkyParameters { ground_scale, ..usual }).dome.expect("a dome");
+    let (full, half, none) = (of(1.0), of(0.5), of(0.0));
+    let frame = SkyFrame::new(direction(40_f64.to_radians(), 0.0), DVec3::Y);
+    for elevation in [-1.2_f64, -0.1, 0.1, 1.2] {
+        let toward = direction(elevation, 1.0).as_vec3();
+        let [full, half, none] = [&full, &half, &none].map(|dome| dome.radiance(&frame, toward));
+        let is_ground = elevation < 0.0;
+        assert_eq!(half, if is_ground { full * 0.5 } else { full }, "{elevation}");
+        assert_eq!(none, if is_ground { Vec3::ZERO } else { full }, "{elevation}");
+    }
 }

@@ -83,7 +83,7 @@ impl<const BECKMANN: bool> Bxdf for PlasticBxdf<BECKMANN> {
 
     #[inline(always)]
     fn set_looked_up_color(&mut self, point: &PlasticPoint, color: Vec3) {
-        self.base = base_layer_f(color.min(Vec3::ONE), point.ior, &point.albedo);
+        self.base = base_layer_f(color.min(Vec3::ONE), point.ior, &point.albedo, point.is_linear);
     }
 
     #[inline(always)]

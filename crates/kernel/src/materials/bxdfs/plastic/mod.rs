@@ -29,6 +29,8 @@ pub struct Plastic {
     ior: f32,
     /// Albedos of the coat.
     albedos: AlbedoTable,
+    /// Whether the base's reflectance is proportional to kd.
+    is_linear: bool,
 }
 
 /// [`Plastic`] at a point, after texture lookups.
@@ -46,6 +48,8 @@ pub struct PlasticPoint {
     pub alpha: f32,
     /// Albedo of the coat.
     pub albedo: LobeAlbedoPolynomial,
+    /// Whether the base's reflectance is proportional to kd.
+    pub is_linear: bool,
 }
 
 impl Plastic {
@@ -70,7 +74,14 @@ impl Plastic {
                 fresnel,
             )
         };
-        Self { diffuse, specular, roughness, ior, albedos }
+        Self { diffuse, specular, roughness, ior, albedos, is_linear: false }
+    }
+
+    /// Makes the reflectance of the base proportional to kd, as if the light that the coat reflects back met a
+    /// white base. Colors do not become more saturated.
+    #[must_use]
+    pub fn with_linear_base(self) -> Self {
+        Self { is_linear: true, ..self }
     }
 
     /// Whether the coat is smooth.
@@ -80,10 +91,12 @@ impl Plastic {
 }
 
 /// Computes f in sr⁻¹ of a base from its kd, for light that passes through the coat in both directions.
-fn base_layer_f(diffuse: Vec3, ior: f32, coat: &LobeAlbedoPolynomial) -> Vec3 {
+fn base_layer_f(diffuse: Vec3, ior: f32, coat: &LobeAlbedoPolynomial, is_linear: bool) -> Vec3 {
     let squared = ior * ior;
     let returned = 1.0 - (1.0 - coat.mean) / squared;
-    reflectance_under_coat(diffuse, returned) * (FRAC_1_PI / squared)
+    let reflected =
+        if is_linear { diffuse / (1.0 - returned) } else { reflectance_under_coat(diffuse, returned) };
+    reflected * (FRAC_1_PI / squared)
 }
 
 impl BxdfMaterial for Plastic {
@@ -97,11 +110,12 @@ impl BxdfMaterial for Plastic {
         let (albedo, is_smooth) = (self.albedos.lobe_at_roughness(roughness), self.is_smooth());
         PlasticPoint {
             diffuse,
-            base: base_layer_f(diffuse, self.ior, &albedo),
+            base: base_layer_f(diffuse, self.ior, &albedo, self.is_linear),
             specular: if is_smooth { Vec3::ZERO } else { specular },
             ior: self.ior,
             alpha: if is_smooth { 0.0 } else { microfacet::alphas_from_roughness(roughness, 0.0)[0] },
             albedo,
+            is_linear: self.is_linear,
         }
     }
 
@@ -133,7 +147,7 @@ impl BxdfParameters for PlasticPoint {
 
     fn tinted(self, color: Vec3) -> Self {
         let diffuse = (self.diffuse * color).min(Vec3::ONE);
-        Self { diffuse, base: base_layer_f(diffuse, self.ior, &self.albedo), ..self }
+        Self { diffuse, base: base_layer_f(diffuse, self.ior, &self.albedo, self.is_linear), ..self }
     }
 }
 

@@ -62,6 +62,17 @@ fn values_match_the_formulas_and_are_reciprocal() {
 }
 
 #[test]
+fn linear_bases_scale_the_white_base() {
+    for alpha in [0.0, 0.3] {
+        let white = point(&plastic(Vec3::ONE, 1.0, 1.5, alpha));
+        let linear = point(&plastic(RED, 1.0, 1.5, alpha).with_linear_base());
+        assert!((linear.base - RED * white.base).abs().max_element() < 1e-6, "{alpha}");
+        let tinted = point(&plastic(Vec3::ONE, 1.0, 1.5, alpha).with_linear_base()).tinted(RED);
+        assert!((tinted.base - linear.base).abs().max_element() < 1e-6, "{alpha}");
+    }
+}
+
+#[test]
 fn lanes_are_independent() {
     let points: Vec<PlasticPoint> = [0.0, 0.001, 0.05, 0.6]
         .into_iter()

@@ -1,0 +1,98 @@
+"""Reports how glimt reads the scenes of other renderers: one row per file of the given folders.
+
+    python3 benches/foreign/coverage.py [--glimt target/release/glimt] [-D NAME=VALUE] FOLDER...
+
+Each file is checked twice: with all substitutions allowed, and with --strict. The result is one of
+
+    opens          without any note
+    notes          opens with notes about definitions that differ
+    substitution   opens, but a feature without an equivalent is replaced
+    incomplete     an asset of the file is missing
+    refused        anything else
+
+followed by the first reason. Files without a sensor are parts of scenes and are skipped, as are XML files that are not Mitsuba scenes.
+"""
+
+import argparse
+import json
+import re
+import subprocess
+import sys
+from collections import Counter
+from pathlib import Path
+
+MISSING = re.compile(r"not found|Git LFS pointer|cannot read|no such file", re.IGNORECASE)
+
+
+def is_whole_scene(path, seen=()):
+    """Whether a file, or a file that it includes, has a sensor or a camera."""
+    text = path.read_text(encoding="utf-8", errors="replace")
+    if path.suffix == ".pbrt":
+        return bool(re.search(r"^\s*WorldBegin", text, re.MULTILINE))
+    if "<scene" not in text:
+        return False
+    if re.search(r"<(sensor|camera)\b", text):
+        return True
+    for name in re.findall(r"<include[^>]*filename\s*=\s*[\"']([^\"']+)", text):
+        inner = path.parent / name
+        if inner.is_file() and inner not in seen and is_whole_scene(inner, (*seen, path)):
+            return True
+    return False
+
+
+def check(glimt, path, options):
+    """Runs `glimt check` and returns its exit code and diagnostics."""
+    command = [glimt, "check", "--json", *options, str(path)]
+    try:
+        run = subprocess.run(command, capture_output=True, text=True, timeout=600)
+    except subprocess.TimeoutExpired:
+        return -1, [{"severity": "error", "message": "timeout"}]
+    try:
+        return run.returncode, json.loads(run.stdout)["diagnostics"]
+    except (json.JSONDecodeError, KeyError):
+        message = run.stderr.strip().splitlines() or ["no output"]
+        return run.returncode, [{"severity": "error", "message": message[0]}]
+
+
+def classify(glimt, path, options):
+    """Returns the result for a file and its first reason."""
+    code, found = check(glimt, path, options)
+    errors = [one["message"] for one in found if one["severity"] == "error"]
+    if code != 0:
+        missing = [one for one in errors if MISSING.search(one)]
+        others = [one for one in errors if not MISSING.search(one)]
+        return ("incomplete", missing[0]) if missing and not others else ("refused", (others or ["no reason"])[0])
+    strict, strict_found = check(glimt, path, [*options, "--strict"])
+    if strict != 0:
+        return "substitution", "; ".join(one["message"] for one in strict_found)
+    warnings = [one["message"] for one in found]
+    return ("notes", "; ".join(warnings)) if warnings else ("opens", "")
+
+
+def main():
+    """Prints the table and the counts."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
+    parser.add_argument("--glimt", default="target/release/glimt")
+    parser.add_argument("-D", action="append", default=[], metavar="NAME=VALUE")
+    parser.add_argument("folders", nargs="+", type=Path)
+    arguments = parser.parse_args()
+    options = [f"-D{define}" for define in arguments.D]
+    totals = Counter()
+    for folder in arguments.folders:
+        counts = Counter()
+        files = [folder] if folder.is_file() else sorted([*folder.rglob("*.xml"), *folder.rglob("*.pbrt")])
+        for path in files:
+            if not is_whole_scene(path):
+                continue
+            result, reason = classify(arguments.glimt, path, options)
+            counts[result] += 1
+            name = path if folder.is_file() else path.relative_to(folder)
+            print(f"{result:13}{name}  {reason[:300]}", flush=True)
+        print(f"{folder}: {sum(counts.values())} files: {dict(counts)}", flush=True)
+        totals += counts
+    print(f"total: {sum(totals.values())} files: {dict(totals)}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

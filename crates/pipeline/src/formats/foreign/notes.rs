@@ -1,0 +1,112 @@
+//! Collects notes and substitutions: features of foreign scenes whose definition differs from glimt's, and
+//! features without an equivalent. Each kind is reported once, with its first place and its count.
+
+use std::collections::HashMap;
+use std::ops::Range;
+
+use crate::scene::SourceFiles;
+use crate::scene::diagnostic::{Diagnostic, Severity};
+
+/// How a feature differs in glimt.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub(crate) enum NoteKind {
+    /// Replaces a feature that changes the light of the scene.
+    LightSubstitution,
+    /// Replaces another feature without an equivalent.
+    Substitution,
+    /// The definition differs.
+    Note,
+}
+
+/// The notes and substitutions of a scene.
+#[derive(Debug, Default)]
+pub(crate) struct NoteCollector {
+    notes: Vec<Note>,
+    by_text: HashMap<(NoteKind, String), usize>,
+}
+
+#[derive(Debug)]
+struct Note {
+    kind: NoteKind,
+    /// The feature, such as "`curve`".
+    subject: String,
+    /// Its substitute or the difference.
+    text: String,
+    span: Range<usize>,
+    count: usize,
+}
+
+impl NoteCollector {
+    /// Adds a feature. `subject` names it, and `text` states its substitute or the difference. Features with
+    /// the same subject and text are counted.
+    pub(crate) fn add(&mut self, kind: NoteKind, subject: &str, text: &str, span: Range<usize>) {
+        let key = (kind, format!("{subject}\n{text}"));
+        match self.by_text.get(&key) {
+            Some(&index) => self.notes[index].count += 1,
+            None => {
+                self.by_text.insert(key, self.notes.len());
+                let (subject, text) = (subject.to_owned(), text.to_owned());
+                self.notes.push(Note { kind, subject, text, span, count: 1 });
+            }
+        }
+    }
+
+    /// Adds a note about a definition that differs.
+    pub(crate) fn note(&mut self, subject: &str, text: &str, span: Range<usize>) {
+        self.add(NoteKind::Note, subject, text, span);
+    }
+
+    /// Adds a substitution.
+    pub(crate) fn substitute(&mut self, subject: &str, text: &str, span: Range<usize>) {
+        self.add(NoteKind::Substitution, subject, text, span);
+    }
+
+    /// Adds a substitution that changes the light.
+    pub(crate) fn substitute_light(&mut self, subject: &str, text: &str, span: Range<usize>) {
+        self.add(NoteKind::LightSubstitution, subject, text, span);
+    }
+
+    /// Returns the notes and the substitutions as warnings. Substitutions that change the light are first.
+    pub(crate) fn into_diagnostics(mut self, sources: &SourceFiles) -> (Vec<Diagnostic>, Vec<Diagnostic>) {
+        self.notes.sort_by_key(|note| note.kind);
+        let (mut notes, mut substitutions) = (Vec::new(), Vec::new());
+        for note in self.notes {
+            let count = if note.count == 1 { String::new() } else { format!("{} × ", note.count) };
+            let light = match note.kind {
+                NoteKind::LightSubstitution => "the light differs: ",
+                NoteKind::Substitution | NoteKind::Note => "",
+            };
+            let message = format!("{light}{count}{}: {}", note.subject, note.text);
+            let diagnostic = sources.diagnostic(Severity::Warning, note.span, message, "", None);
+            match note.kind {
+                NoteKind::Note => notes.push(diagnostic),
+                NoteKind::LightSubstitution | NoteKind::Substitution => substitutions.push(diagnostic),
+            }
+        }
+        (notes, substitutions)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    #[test]
+    fn notes_are_counted_and_light_is_first() {
+        let (mut sources, mut notes) = (SourceFiles::default(), NoteCollector::default());
+        sources.add(Path::new("a.xml"), "one\ntwo\n".into());
+        let second = sources.add(Path::new("b.xml"), "three\nfour".into());
+        notes.note("`bump`", "fades", 0..3);
+        notes.substitute("`curve`", "skipped", 4..7);
+        notes.substitute("`curve`", "skipped", 0..3);
+        notes.substitute_light("`hair`", "diffuse", second + 6..second + 10);
+        let (notes, substitutions) = notes.into_diagnostics(&sources);
+        assert_eq!(notes.iter().map(|one| &*one.message).collect::<Vec<_>>(), ["`bump`: fades"]);
+        let messages: Vec<_> = substitutions.iter().map(|one| &*one.message).collect();
+        assert_eq!(messages, ["the light differs: `hair`: diffuse", "2 × `curve`: skipped"]);
+        assert_eq!(substitutions[0].path, Path::new("b.xml"));
+        assert_eq!(substitutions[0].place.as_ref().map(|place| place.span.clone()), Some(6..10));
+    }
+}

@@ -1,0 +1,88 @@
+//! Finds the meshes and images of a scene.
+
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use super::reader::SceneReader;
+use super::xml::shorten;
+use crate::assets::Companion;
+use crate::formats::foreign::options::MissingAssetMode;
+
+impl SceneReader<'_> {
+    /// Searches for a file. Reports an error if it does not exist, or returns `None` with a substitution if
+    /// missing files are allowed.
+    pub(super) fn find_file(&mut self, name: &str, span: &Range<usize>) -> Option<PathBuf> {
+        let own_folder = self.files.path_at(span).and_then(Path::parent);
+        let own = own_folder.map(|folder| folder.join(name));
+        // Files written on Windows have backslashes.
+        let plain = name.replace('\\', "/");
+        let names = [name, plain.as_str()];
+        let candidates =
+            names.iter().flat_map(|name| self.folders.iter().rev().map(move |folder| folder.join(name)));
+        let found = candidates.chain(own).find(|path| path.is_file());
+        if found.is_none() {
+            let first =
+                self.folders.first().map_or_else(|| PathBuf::from(name), |folder| folder.join(&plain));
+            self.companions.push(Companion { path: first, hash: None, stamp: None });
+        }
+        found
+    }
+
+    /// Returns the name by which the document refers to an asset. Reports an error if the file does not
+    /// exist, unless missing files are allowed.
+    pub(super) fn asset(&mut self, name: &str, span: &Range<usize>, kind: &str) -> Option<String> {
+        let path = self.asset_path(name, span, kind)?;
+        Some(self.asset_reference(&path))
+    }
+
+    /// Returns the path of an asset. Reports an error if the file does not exist, unless missing files are
+    /// allowed.
+    pub(super) fn asset_path(&mut self, name: &str, span: &Range<usize>, kind: &str) -> Option<PathBuf> {
+        if let Some(found) = self.find_file(name, span) {
+            return Some(found);
+        }
+        match self.options.missing {
+            MissingAssetMode::Error => {
+                let help = "add the file, or use --missing note to render without it".to_owned();
+                self.error(span.clone(), format!("{kind} not found: {}", shorten(name)), Some(help));
+            }
+            MissingAssetMode::Note => {
+                let text =
+                    if kind == "image" { "not found; replaced by gray" } else { "not found; left out" };
+                self.notes.substitute_light(&format!("{kind} {}", shorten(name)), text, span.clone());
+            }
+        }
+        None
+    }
+
+    /// Returns the name by which the document refers to an existing file.
+    pub(super) fn asset_reference(&mut self, path: &Path) -> String {
+        let Some(folder) = self.asset_folder else {
+            let scene_folder = self.path.parent().unwrap_or(Path::new(""));
+            let relative = path.strip_prefix(scene_folder).unwrap_or(path);
+            // A path that does not start with the scene's folder is relative to the working directory.
+            let is_relative = relative == path && !path.is_absolute() && !scene_folder.as_os_str().is_empty();
+            let absolute = is_relative.then(|| std::path::absolute(path).ok()).flatten();
+            return absolute.as_deref().unwrap_or(relative).to_string_lossy().into_owned();
+        };
+        if let Some(known) = self.asset_names.get(path) {
+            return known.clone();
+        }
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy().to_lowercase();
+        let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+        let plain: String = stem
+            .chars()
+            .map(|c| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' })
+            .take(60)
+            .collect();
+        // Names of numbers are allowed for files, so use the extension to make them unique.
+        let unique = self.used_asset_names.make_unique(&format!("{plain}.{extension}"), "asset");
+        let name = match unique.strip_prefix(&format!("{plain}.{extension}")) {
+            Some("") | None => unique.clone(),
+            Some(number) => format!("{plain}{number}.{extension}"),
+        };
+        let name = format!("{folder}/{name}");
+        self.asset_names.insert(path.to_owned(), name.clone());
+        name
+    }
+}

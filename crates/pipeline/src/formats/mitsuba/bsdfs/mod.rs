@@ -1,0 +1,316 @@
+//! Converts BSDFs to materials.
+
+mod nested;
+mod surfaces;
+
+use super::graph::{Child, Object, ObjectIndex, ObjectKind};
+use super::material_key::{MaterialKey, UvConvention};
+use super::reader::{ColorRole, ColorSource, Entries, NumberSource, SceneReader, luminance};
+use super::textures::TextureUse;
+use crate::formats::rounding::{shorten as shorten_number, shorten_color};
+use crate::math::DVec3;
+use crate::scene::BuiltValue;
+
+/// Index of refraction of air, Mitsuba's usual exterior.
+const AIR: f64 = 1.000_277;
+
+/// Plugins that are BSDFs in Mitsuba 3, 2 or 0.6.
+const KNOWN_BSDFS: [&str; 26] = [
+    "diffuse",
+    "roughdiffuse",
+    "conductor",
+    "roughconductor",
+    "dielectric",
+    "thindielectric",
+    "roughdielectric",
+    "plastic",
+    "roughplastic",
+    "twosided",
+    "mask",
+    "blendbsdf",
+    "mixturebsdf",
+    "bumpmap",
+    "normalmap",
+    "phong",
+    "ward",
+    "coating",
+    "roughcoating",
+    "principled",
+    "principledthin",
+    "null",
+    "difftrans",
+    "hk",
+    "irawan",
+    "measured",
+];
+
+/// Context of a nested BSDF.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct BsdfContext {
+    uv: UvConvention,
+    /// Whether a `twosided` contains the BSDF.
+    is_two_sided: bool,
+    /// The `mask` that contains the BSDF.
+    mask: Option<ObjectIndex>,
+    /// The `coating` that contains the BSDF.
+    coat: Option<ObjectIndex>,
+    depth: u32,
+}
+
+/// A material that is being built.
+#[derive(Debug, Default)]
+pub(super) struct MaterialBuilder {
+    /// The keys, including `type`.
+    keys: Entries,
+    /// Whether the surface is an index-matched boundary that has no effect.
+    is_invisible: bool,
+    /// Whether the material transmits light as glass.
+    is_glass: bool,
+    is_blend: bool,
+    /// Whether the back of the surface is black.
+    is_one_sided: bool,
+    /// Whether the surface has a smooth conductor or a smooth dielectric coat.
+    has_smooth_reflection: bool,
+}
+
+impl MaterialBuilder {
+    fn new(kind: &'static str, keys: Entries) -> Self {
+        let keys = std::iter::once(("type", kind.into())).chain(keys).collect();
+        Self { keys, ..Self::default() }
+    }
+
+    /// A material whose back is black unless a `twosided` contains it.
+    fn one_sided(kind: &'static str, keys: Entries) -> Self {
+        Self { is_one_sided: true, ..Self::new(kind, keys) }
+    }
+
+    fn has(&self, key: &str) -> bool {
+        self.keys.iter().any(|(known, _)| *known == key)
+    }
+}
+
+/// Maximum depth of nested BSDFs.
+const MAX_DEPTH: u32 = 32;
+
+impl<'a> SceneReader<'a> {
+    /// Returns the name of a shape's material, adding it if it is new. Returns `None` if the surface is
+    /// invisible or has errors.
+    pub(super) fn material(
+        &mut self,
+        bsdf: Option<&'a Child>,
+        emitter: Option<ObjectIndex>,
+        uv: UvConvention,
+        shape: &'a Object,
+    ) -> Option<String> {
+        let index = bsdf.map(|child| child.target);
+        let has_textures = index.into_iter().chain(emitter).any(|index| self.has_textures(index));
+        let uv = if has_textures { uv } else { UvConvention::default() };
+        let key = MaterialKey { bsdf: index, emitter, uv };
+        if let Some(known) = self.materials.get(&key) {
+            return known.clone();
+        }
+        let context = BsdfContext { uv, is_two_sided: false, mask: None, coat: None, depth: 0 };
+        let builder = match bsdf {
+            Some(child) => self.bsdf(child.target, context),
+            None => Some(MaterialBuilder::one_sided("phong", vec![("diffuse", 0.5.into())])),
+        };
+        let span = bsdf.map_or(shape.span.clone(), |child| self.object(child.target).span.clone());
+        let name = builder.and_then(|mut builder| {
+            if let Some(emitter) = emitter {
+                self.add_emission(&mut builder, emitter, uv, shape);
+            } else if builder.is_invisible {
+                return None;
+            }
+            let wanted = bsdf.map(|child| self.object(child.target));
+            let wanted = wanted.map_or("default", |object| object.id.as_deref().unwrap_or(&object.plugin));
+            Some(self.add_material(builder, wanted, span))
+        });
+        self.materials.insert(key, name.clone());
+        name
+    }
+
+    /// Adds a material to the document and returns its name.
+    fn add_material(
+        &mut self,
+        builder: MaterialBuilder,
+        wanted: &str,
+        span: std::ops::Range<usize>,
+    ) -> String {
+        let name = self.material_names.make_unique(wanted, "material");
+        self.document.set_span_for_next_values(span);
+        self.document.start_named_table("materials", &name);
+        let is_one_sided = builder.is_one_sided && !builder.is_glass && !builder.is_blend;
+        self.set_all(builder.keys);
+        if is_one_sided {
+            self.document.set("sides", "front");
+        }
+        name
+    }
+
+    /// Whether an object or an object in it is a texture.
+    fn has_textures(&self, index: ObjectIndex) -> bool {
+        let mut pending = vec![index];
+        let mut visited = 0;
+        while let Some(index) = pending.pop() {
+            let object = self.object(index);
+            if object.kind == ObjectKind::Texture {
+                return true;
+            }
+            visited += 1;
+            if visited > 10_000 {
+                return true;
+            }
+            pending.extend(object.children.iter().map(|child| child.target));
+        }
+        false
+    }
+
+    /// Adds the emission of an area light.
+    fn add_emission(
+        &mut self,
+        builder: &mut MaterialBuilder,
+        emitter: ObjectIndex,
+        uv: UvConvention,
+        shape: &'a Object,
+    ) {
+        let emitter = self.object(emitter);
+        if builder.is_blend {
+            let text = "the shape does not emit";
+            self.notes.substitute_light("an area light on a `blendbsdf`", text, shape.span.clone());
+            return;
+        }
+        if builder.is_invisible {
+            // A surface that only emits.
+            *builder = MaterialBuilder::one_sided("phong", vec![("diffuse", 0.0.into())]);
+        }
+        match self.color(emitter, "radiance", ColorRole::Emission, 1.0) {
+            ColorSource::Constant(color) => {
+                if color != DVec3::ZERO {
+                    builder.keys.push(("emission", shorten_color(color)));
+                }
+            }
+            ColorSource::Texture(texture) => match self.texture(texture, TextureUse::Color, uv) {
+                Some(name) => {
+                    builder.keys.push(("emission", BuiltValue::Table(vec![("texture", name.into())])));
+                }
+                None => {
+                    let color = self.constant_of_texture(texture, ColorRole::Emission);
+                    builder.keys.push(("emission", shorten_color(color.unwrap_or(DVec3::ONE))));
+                }
+            },
+        }
+    }
+
+    /// Converts a BSDF. Returns `None` after an error.
+    fn bsdf(&mut self, index: ObjectIndex, context: BsdfContext) -> Option<MaterialBuilder> {
+        let object = self.object(index);
+        if context.depth > MAX_DEPTH {
+            self.error(object.span.clone(), "BSDFs are nested too deeply", None);
+            return None;
+        }
+        let context = BsdfContext { depth: context.depth + 1, ..context };
+        let built = match object.plugin.as_str() {
+            "diffuse" | "lambertian" => {
+                let color = self.reflectance(object, "reflectance", 0.5, context);
+                Some(MaterialBuilder::one_sided("phong", vec![("diffuse", color)]))
+            }
+            "roughdiffuse" => {
+                let color = self.reflectance(object, "reflectance", 0.5, context);
+                object.property("use_fast_approx");
+                object.property("alpha");
+                self.notes.substitute_light("`roughdiffuse`", "replaced by `diffuse`", object.span.clone());
+                Some(MaterialBuilder::one_sided("phong", vec![("diffuse", color)]))
+            }
+            "conductor" | "roughconductor" => self.conductor(object, context),
+            "dielectric" | "roughdielectric" | "thindielectric" => Some(self.dielectric(object, context)),
+            "plastic" | "roughplastic" => Some(self.plastic(object, context)),
+            "phong" => Some(self.phong(object, context)),
+            "ward" => Some(self.ward(object, context)),
+            "coating" | "roughcoating" => self.coating(index, context),
+            "twosided" => self.two_sided(object, context),
+            "mask" => self.mask(index, context),
+            "blendbsdf" | "mixturebsdf" => self.blend(object, context),
+            "bumpmap" | "bump" => self.bump_map(object, context),
+            "normalmap" => self.normal_map(object, context),
+            "principled" => Some(self.principled(object, context)),
+            "principledthin" => {
+                self.notes.substitute_light(
+                    "`principledthin`",
+                    "rendered like `principled`",
+                    object.span.clone(),
+                );
+                Some(self.principled(object, context))
+            }
+            "difftrans" => {
+                let color = self.reflectance(object, "transmittance", 0.5, context);
+                let keys = vec![("diffuse", 0.0.into()), ("diffuse_transmission", color)];
+                Some(MaterialBuilder::new("phong", keys))
+            }
+            "null" => Some(MaterialBuilder { is_invisible: true, ..MaterialBuilder::default() }),
+            "hair" => return self.refused(object, "hair"),
+            "pplastic" | "polarizer" | "retarder" | "circular" | "measured_polarized" => {
+                return self.refused(object, "polarization");
+            }
+            "measured" => return self.refused(object, "measured BSDFs"),
+            "hk" | "irawan" => return self.refused(object, "this BSDF"),
+            _ => {
+                self.unknown_plugin(object, "BSDF", &KNOWN_BSDFS);
+                None
+            }
+        };
+        self.report_unused(index);
+        let is_smooth =
+            matches!(object.plugin.as_str(), "conductor" | "dielectric" | "thindielectric" | "plastic");
+        built.map(|built| MaterialBuilder {
+            has_smooth_reflection: built.has_smooth_reflection || is_smooth,
+            ..built
+        })
+    }
+
+    fn refused(&mut self, object: &Object, what: &str) -> Option<MaterialBuilder> {
+        self.refuse(object, what);
+        None
+    }
+
+    /// Converts a reflectance or transmittance to the value of a color key.
+    fn reflectance(
+        &mut self,
+        object: &'a Object,
+        name: &str,
+        default: f64,
+        context: BsdfContext,
+    ) -> BuiltValue {
+        let color = self.color(object, name, ColorRole::Reflectance, default);
+        self.color_value(color, context, 1.0)
+    }
+
+    /// Converts a color or texture to the value of a color key, times `factor`.
+    fn color_value(&mut self, color: ColorSource, context: BsdfContext, factor: f64) -> BuiltValue {
+        match color {
+            ColorSource::Constant(color) => shorten_color(color * factor),
+            ColorSource::Texture(texture) => {
+                match self.texture_with_factor(texture, TextureUse::Color, context.uv, factor) {
+                    Some(name) => BuiltValue::Table(vec![("texture", name.into())]),
+                    None => {
+                        let color = self.constant_of_texture(texture, ColorRole::Reflectance);
+                        shorten_color(color.unwrap_or(DVec3::splat(0.5)) * factor)
+                    }
+                }
+            }
+        }
+    }
+
+    /// Converts a number or texture to the value of a number key.
+    fn number_value(&mut self, number: NumberSource, context: BsdfContext) -> BuiltValue {
+        match number {
+            NumberSource::Constant(number) => shorten_number(number.clamp(0.0, 1.0)).into(),
+            NumberSource::Texture(texture) => match self.number_texture(texture, context.uv) {
+                Some(value) => value,
+                None => {
+                    let color = self.constant_of_texture(texture, ColorRole::Reflectance);
+                    shorten_number(color.map_or(0.5, luminance).clamp(0.0, 1.0)).into()
+                }
+            },
+        }
+    }
+}

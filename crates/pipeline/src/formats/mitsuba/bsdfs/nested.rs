@@ -1,0 +1,257 @@
+//! Converts BSDFs that contain other BSDFs.
+
+use super::{BsdfContext, MaterialBuilder};
+use crate::formats::mitsuba::graph::{Child, Object, ObjectIndex, ObjectKind};
+use crate::formats::mitsuba::property::PropertyValue;
+use crate::formats::mitsuba::reader::{ColorRole, ColorSource, Entries, NumberSource, SceneReader};
+use crate::formats::mitsuba::textures::TextureUse;
+use crate::formats::mitsuba::xml::shorten;
+use crate::formats::rounding::{shorten as shorten_number, shorten_color};
+use crate::math::DVec3;
+use crate::scene::BuiltValue;
+
+impl<'a> SceneReader<'a> {
+    /// Returns the single nested BSDF.
+    pub(super) fn nested_bsdf(&mut self, object: &'a Object) -> Option<&'a Child> {
+        let nested = self.children_of_kind(object, ObjectKind::Bsdf).next();
+        if nested.is_none() {
+            let message = format!("`{}` needs a nested BSDF", shorten(&object.plugin));
+            self.error(object.span.clone(), message, None);
+        }
+        nested
+    }
+
+    pub(super) fn two_sided(&mut self, object: &'a Object, context: BsdfContext) -> Option<MaterialBuilder> {
+        let nested = self.nested_bsdf(object)?;
+        if let Some(second) = self.children_of_kind(object, ObjectKind::Bsdf).nth(1)
+            && second.target != nested.target
+        {
+            let text = "the first BSDF is on both sides";
+            self.notes.substitute_light("`twosided` with two BSDFs", text, object.span.clone());
+        }
+        let context = BsdfContext { is_two_sided: true, ..context };
+        let built = self.bsdf(nested.target, context)?;
+        Some(MaterialBuilder { is_one_sided: false, ..built })
+    }
+
+    pub(super) fn mask(&mut self, index: ObjectIndex, context: BsdfContext) -> Option<MaterialBuilder> {
+        let object = self.object(index);
+        let nested = self.nested_bsdf(object)?;
+        let opacity = self.number(object, "opacity", 0.5);
+        if opacity == NumberSource::Constant(1.0) {
+            return self.bsdf(nested.target, context);
+        }
+        if context.mask.is_some() {
+            let text = "the inner mask is ignored";
+            self.notes.substitute_light("`mask` around another mask", text, object.span.clone());
+            return self.bsdf(nested.target, context);
+        }
+        let context = BsdfContext { mask: Some(index), ..context };
+        let mut built = self.bsdf(nested.target, context)?;
+        // The materials of a blend have the opacity already.
+        if !built.is_invisible && !built.is_blend {
+            self.add_opacity(&mut built, context);
+        }
+        Some(built)
+    }
+
+    /// Adds the opacity of the mask that contains a material.
+    pub(super) fn add_opacity(&mut self, built: &mut MaterialBuilder, context: BsdfContext) {
+        let Some(object) = context.mask.map(|index| self.object(index)) else { return };
+        if built.is_glass && !built.has("thin") || built.has("opacity") {
+            let text = "the mask is ignored";
+            self.notes.substitute_light("`mask` around solid glass", text, object.span.clone());
+            return;
+        }
+        let text = "they let light from point, spot and directional lights through, which Mitsuba blocks";
+        self.notes.note("masks", text, object.span.clone());
+        let opacity = self.number(object, "opacity", 0.5);
+        let value = self.number_value(opacity, context);
+        built.keys.push(("opacity", value));
+    }
+
+    pub(super) fn blend(&mut self, object: &'a Object, context: BsdfContext) -> Option<MaterialBuilder> {
+        let nested: Vec<&Child> = self.children_of_kind(object, ObjectKind::Bsdf).collect();
+        if object.plugin == "mixturebsdf" {
+            object.property("weights");
+            self.refuse(object, "mixtures of BSDFs; use `blendbsdf`");
+            return None;
+        }
+        let [first, second] = nested[..] else {
+            let message = format!("`blendbsdf` needs two nested BSDFs, found {}", nested.len());
+            self.error(object.span.clone(), message, None);
+            return None;
+        };
+        let weight = self.number(object, "weight", 0.5);
+        let weight = self.number_value(weight, context);
+        let mut names = Vec::new();
+        for child in [first, second] {
+            let mut built = self.bsdf(child.target, context)?;
+            let inner = self.object(child.target);
+            if built.is_glass && !built.has("thin") {
+                self.refuse(object, "blends that contain solid glass");
+                return None;
+            }
+            if built.is_invisible {
+                // A surface without effect is transparent.
+                built = MaterialBuilder::new("phong", vec![("diffuse", 0.0.into()), ("opacity", 0.0.into())]);
+            }
+            if built.has_smooth_reflection {
+                let text = "glimt blends their light by the weight; Mitsuba mixes up their pdfs";
+                self.notes.note("smooth metal, glass or plastic in a blend", text, object.span.clone());
+            }
+            built.is_one_sided &= !context.is_two_sided;
+            self.add_enclosing_keys(&mut built, context);
+            let wanted = inner.id.as_deref().unwrap_or(&inner.plugin);
+            names.push(BuiltValue::from(self.add_material(built, wanted, inner.span.clone())));
+        }
+        let keys = vec![("materials", BuiltValue::Array(names)), ("weight", weight)];
+        Some(MaterialBuilder { is_blend: true, ..MaterialBuilder::new("blend", keys) })
+    }
+
+    pub(super) fn coating(&mut self, index: ObjectIndex, context: BsdfContext) -> Option<MaterialBuilder> {
+        let object = self.object(index);
+        let nested = self.nested_bsdf(object)?;
+        if context.coat.is_some() {
+            let text = "the inner coat is left out";
+            self.notes.substitute_light("a coat on another coat", text, object.span.clone());
+            return self.bsdf(nested.target, context);
+        }
+        let context = BsdfContext { coat: Some(index), ..context };
+        let mut built = self.bsdf(nested.target, context)?;
+        // The materials of a blend have the coat already.
+        if !built.is_invisible && !built.is_blend {
+            self.add_coat(&mut built, context);
+        }
+        Some(built)
+    }
+
+    /// Adds the keys of the `mask` and the `coating` that contain a part of a blend.
+    pub(super) fn add_enclosing_keys(&mut self, part: &mut MaterialBuilder, context: BsdfContext) {
+        if part.is_blend {
+            return;
+        }
+        if context.coat.is_some() {
+            self.add_coat(part, context);
+        }
+        if context.mask.is_some() {
+            self.add_opacity(part, context);
+        }
+    }
+
+    /// Adds the coat of the `coating` that contains a material.
+    fn add_coat(&mut self, built: &mut MaterialBuilder, context: BsdfContext) {
+        let Some(object) = context.coat.map(|index| self.object(index)) else { return };
+        if built.is_glass {
+            let text = "the coat is left out";
+            self.notes.substitute_light("a coat on glass", text, object.span.clone());
+            return;
+        }
+        let text = "the interreflections between the coat and the base differ";
+        self.notes.note(&format!("`{}`", object.plugin), text, object.span.clone());
+        let ior = self.relative_ior(object, 1.5046).max(1.0);
+        let thickness = self.float(object, "thickness").unwrap_or(1.0);
+        self.ignored_scale(object, "specular_reflectance");
+        let roughness = match object.plugin.as_str() {
+            "roughcoating" => {
+                let mut keys = Entries::new();
+                self.add_distribution(&mut keys, object, 0.1, context, false);
+                keys.into_iter().find(|(key, _)| *key == "roughness").map_or(0.3.into(), |(_, value)| value)
+            }
+            _ => 0.0.into(),
+        };
+        built.keys.push(("coat", 1.0.into()));
+        built.keys.push(("coat_roughness", roughness));
+        built.keys.push(("coat_ior", shorten_number(ior).into()));
+        match self.color(object, "sigma_a", ColorRole::Unbounded, 0.0) {
+            ColorSource::Constant(sigma) if sigma != DVec3::ZERO => {
+                // The light passes through the layer twice.
+                let tint = sigma.to_array().map(|sigma| libm::exp(-2.0 * thickness * sigma).clamp(0.0, 1.0));
+                built.keys.push(("coat_tint", shorten_color(tint.into())));
+            }
+            ColorSource::Constant(_) => {}
+            ColorSource::Texture(_) => {
+                self.notes.substitute_light("a texture of `sigma_a`", "replaced by 0", object.span.clone());
+            }
+        }
+    }
+
+    /// Returns the nested texture of a bump or normal map.
+    pub(super) fn nested_texture(&mut self, object: &'a Object) -> Option<ObjectIndex> {
+        let texture = self.children_of_kind(object, ObjectKind::Texture).next();
+        if texture.is_none() {
+            let message = format!("`{}` needs a nested texture", shorten(&object.plugin));
+            self.error(object.span.clone(), message, None);
+        }
+        texture.map(|child| child.target)
+    }
+
+    pub(super) fn bump_map(&mut self, object: &'a Object, context: BsdfContext) -> Option<MaterialBuilder> {
+        let nested = self.nested_bsdf(object)?;
+        let texture = self.nested_texture(object)?;
+        let mut scale = self.float(object, "scale").unwrap_or(1.0);
+        // Version 0.6 scales the texture with a `scale` texture.
+        let mut texture = texture;
+        while self.object(texture).plugin == "scale" {
+            let outer = self.object(texture);
+            scale *= self.float(outer, "scale").or_else(|| self.float(outer, "value")).unwrap_or(1.0);
+            let Some(inner) = self.children_of_kind(outer, ObjectKind::Texture).next() else { break };
+            texture = inner.target;
+        }
+        let mut built = self.bsdf(nested.target, context)?;
+        if built.is_blend || built.is_invisible || built.has("bump") {
+            let text = "the bump map is left out";
+            self.notes.substitute_light(
+                "`bumpmap` around a blend or another bump map",
+                text,
+                object.span.clone(),
+            );
+            return Some(built);
+        }
+        if let Some(value) = self.height_texture(texture, context.uv) {
+            built.keys.push(("bump", value));
+            built.keys.push(("bump_scale", shorten_number(scale).into()));
+            let text = "light fades as the normal tilts: 2 % darker at 7 degrees";
+            self.notes.note("bump and normal maps", text, object.span.clone());
+        }
+        Some(built)
+    }
+
+    pub(super) fn normal_map(&mut self, object: &'a Object, context: BsdfContext) -> Option<MaterialBuilder> {
+        let nested = self.nested_bsdf(object)?;
+        if let Some(constant) = object.named_child("normalmap").map(|child| self.object(child.target))
+            && constant.plugin == "rawconstant"
+        {
+            self.note_constant_normal_map(constant);
+            return self.bsdf(nested.target, context);
+        }
+        let texture = self.nested_texture(object)?;
+        for name in ["flip_invalid_normals", "use_shadowing_function"] {
+            object.property(name);
+        }
+        let mut built = self.bsdf(nested.target, context)?;
+        if built.is_blend || built.is_invisible || built.has("normal_map") {
+            let text = "the normal map is left out";
+            self.notes.substitute_light(
+                "`normalmap` around a blend or another normal map",
+                text,
+                object.span.clone(),
+            );
+            return Some(built);
+        }
+        if let Some(name) = self.texture(texture, TextureUse::Normal, context.uv) {
+            built.keys.push(("normal_map", name.into()));
+            let text = "light fades as the normal tilts: 2 % darker at 7 degrees";
+            self.notes.note("bump and normal maps", text, object.span.clone());
+        }
+        Some(built)
+    }
+
+    /// Reports a constant normal map, unless it is the identity.
+    pub(super) fn note_constant_normal_map(&mut self, constant: &'a Object) {
+        let value = constant.property("value").map(|property| &property.value);
+        if value != Some(&PropertyValue::Vector(DVec3::new(0.5, 0.5, 1.0))) {
+            self.notes.substitute_light("a constant normal map", "left out", constant.span.clone());
+        }
+    }
+}

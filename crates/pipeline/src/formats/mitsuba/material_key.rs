@@ -1,0 +1,23 @@
+//! What the materials of the document depend on.
+
+use super::graph::ObjectIndex;
+
+/// What a material of the document depends on.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub(super) struct MaterialKey {
+    /// The BSDF, or `None` for the default one.
+    pub(super) bsdf: Option<ObjectIndex>,
+    /// The area light of the shape.
+    pub(super) emitter: Option<ObjectIndex>,
+    /// Texture coordinates of the shape. The same for all shapes if the material has no textures.
+    pub(super) uv: UvConvention,
+}
+
+/// How a shape's texture coordinates in glimt differ from Mitsuba's.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub(super) struct UvConvention {
+    /// Mitsuba's u is 1 − u.
+    pub(super) flips_u: bool,
+    /// Mitsuba's v is 1 − v.
+    pub(super) flips_v: bool,
+}

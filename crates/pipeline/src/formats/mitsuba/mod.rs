@@ -1,0 +1,132 @@
+//! Reads the scenes of Mitsuba 3, 2 and 0.6.
+//!
+//! `xml` reads the files, `graph` resolves references, and the other modules convert the objects to the tables
+//! of a scene file, which [`SceneReader`] collects.
+
+mod assets;
+mod bsdfs;
+mod colors;
+mod emitters;
+mod graph;
+mod material_key;
+mod placement;
+mod plastic;
+mod property;
+mod reader;
+mod settings;
+mod shapes;
+#[cfg(test)]
+mod tests;
+mod textures;
+mod values;
+mod xml;
+
+use std::path::{Path, PathBuf};
+
+use self::graph::{GraphBuilder, ObjectKind};
+use self::reader::SceneReader;
+use self::shapes::ShapeTarget;
+use self::xml::XmlLoader;
+use super::foreign::ForeignError;
+use super::model::file_name;
+use super::{ForeignReadContext, ForeignScene, ImportedScene, scene_from_document};
+use crate::assets::Companion;
+use crate::scene::diagnostic::{Diagnostic, Severity};
+
+/// Files that an import copies: their paths, and their names relative to the scene.
+type CopiedFiles = Vec<(PathBuf, String)>;
+
+/// Reads a scene.
+pub(super) fn read(path: &Path, context: &ForeignReadContext<'_>) -> Result<ForeignScene, ForeignError> {
+    read_scene(path, None, context).map(|(scene, _)| scene)
+}
+
+/// Converts a scene to a scene file, and copies its meshes and images to `folder`.
+pub(super) fn convert(
+    path: &Path,
+    folder: &str,
+    context: &ForeignReadContext<'_>,
+) -> Result<ImportedScene, ForeignError> {
+    let (ForeignScene { document, notes, substitutions, companions, .. }, files) =
+        read_scene(path, Some(folder), context)?;
+    // Check the scene with its files in place, because the copies do not exist yet.
+    let (in_place, _) = read_scene(path, None, context)?;
+    let errors = scene_from_document(in_place.document, path, &[]).err().unwrap_or_default();
+    if errors.iter().any(|error| error.severity == Severity::Error) {
+        return Err(ForeignError::Scene { diagnostics: errors, companions });
+    }
+    let copy = |(source, name): (PathBuf, String)| {
+        context.token.check_pause_and_cancel()?;
+        let bytes = std::fs::read(&source).map_err(|error| {
+            let message = format!("cannot read it: {error}");
+            let diagnostics = vec![Diagnostic::about_file(&source, Severity::Error, message)];
+            ForeignError::Scene { diagnostics, companions: Vec::new() }
+        })?;
+        Ok((PathBuf::from(name), bytes))
+    };
+    let files = files.into_iter().map(copy).collect::<Result<Vec<_>, ForeignError>>()?;
+    let substitutions = substitutions.into_iter().chain(notes).collect();
+    Ok(ImportedScene { document, files, substitutions })
+}
+
+/// Reads a scene. With a folder, the scene refers to copies of its assets, which are also returned.
+fn read_scene(
+    path: &Path,
+    asset_folder: Option<&str>,
+    context: &ForeignReadContext<'_>,
+) -> Result<(ForeignScene, CopiedFiles), ForeignError> {
+    let ForeignReadContext { options, token, .. } = *context;
+    let mut loader = XmlLoader::new(path, &options.defines, token);
+    let root = loader.load_scene(path)?;
+    let XmlLoader { reader: sources, errors, folders, .. } = loader;
+    let fail = |diagnostics: Vec<Diagnostic>, companions: Vec<Companion>| {
+        Err(ForeignError::Scene { diagnostics, companions })
+    };
+    let Some(root) = root.filter(|_| errors.is_empty()) else {
+        return fail(errors, sources.companions);
+    };
+    let graph = match GraphBuilder::new(&sources.files).build(&root) {
+        Ok(graph) => graph,
+        Err(errors) => return fail(errors, sources.companions),
+    };
+    drop(root);
+    let mut reader = SceneReader::new(&graph, &sources.files, path, &folders, asset_folder, context);
+    reader.document.add_comment_above_next_table(format!("{}, as glimt shows it.", file_name(path)));
+    let scene = reader.object(0);
+    reader.add_settings(scene);
+    for child in &scene.children {
+        token.check_pause_and_cancel()?;
+        match reader.object(child.target).kind {
+            ObjectKind::Shape => {
+                reader.add_shape(child.target, ShapeTarget::SCENE);
+            }
+            // A named area light is a definition that shapes refer to.
+            ObjectKind::Emitter if reader.is_named_area_light(child.target) => {}
+            ObjectKind::Emitter => reader.add_emitter(child.target),
+            // BSDFs, textures and media are converted where they are used.
+            ObjectKind::Bsdf
+            | ObjectKind::Film
+            | ObjectKind::Filter
+            | ObjectKind::Integrator
+            | ObjectKind::Medium
+            | ObjectKind::Phase
+            | ObjectKind::Sampler
+            | ObjectKind::Scene
+            | ObjectKind::Sensor
+            | ObjectKind::Spectrum
+            | ObjectKind::Subsurface
+            | ObjectKind::Texture
+            | ObjectKind::Volume => {}
+        }
+    }
+    let SceneReader { errors, notes, mut document, companions: found, asset_names, .. } = reader;
+    let companions: Vec<Companion> = sources.companions.into_iter().chain(found).collect();
+    if !errors.is_empty() {
+        return fail(errors, companions);
+    }
+    let (notes, substitutions) = notes.into_diagnostics(&sources.files);
+    let (hash, files) = (sources.hash, sources.files);
+    document.attach_files(files);
+    let copied = asset_names.into_iter().collect();
+    Ok((ForeignScene { document, hash, companions, notes, substitutions }, copied))
+}

@@ -1,0 +1,303 @@
+//! Shared state of the functions that convert a scene graph to a scene document.
+
+use std::collections::{BTreeMap, HashMap, HashSet};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use super::graph::{Child, Object, ObjectIndex, ObjectKind, SceneGraph};
+use super::material_key::MaterialKey;
+use super::plastic::PlasticCoat;
+use super::property::{PropertyValue, SpectrumValue, TransformValue};
+use super::xml::{MAX_ERRORS, shorten};
+use crate::assets::Companion;
+use crate::control::CancelToken;
+use crate::formats::ForeignReadContext;
+use crate::formats::foreign::notes::NoteCollector;
+use crate::formats::foreign::options::ForeignOptions;
+use crate::formats::model::UsedNames;
+use crate::math::{DMat4, DVec3};
+use crate::scene::diagnostic::{Diagnostic, Severity};
+use crate::scene::nearest::nearest_name;
+use crate::scene::{BuiltValue, SceneDocumentBuilder, SourceFiles};
+use crate::stages::containers::GltfContainers;
+
+/// Keys and values of a table.
+pub(super) type Entries = Vec<(&'static str, BuiltValue)>;
+
+/// What a color is used for, which determines how spectra are converted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) enum ColorRole {
+    /// A reflectance or transmittance from 0 to 1.
+    Reflectance,
+    /// Emitted light.
+    Emission,
+    /// An index of refraction or another unbounded quantity.
+    Unbounded,
+}
+
+/// A color or the texture that contains it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum ColorSource {
+    Constant(DVec3),
+    Texture(ObjectIndex),
+}
+
+/// A number or the texture that contains it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum NumberSource {
+    Constant(f64),
+    Texture(ObjectIndex),
+}
+
+/// Converts a scene graph to a scene document.
+pub(super) struct SceneReader<'a> {
+    pub(super) graph: &'a SceneGraph,
+    pub(super) files: &'a SourceFiles,
+    /// The scene file.
+    pub(super) path: &'a Path,
+    /// Folders to search for assets, the last one first.
+    pub(super) folders: &'a [PathBuf],
+    pub(super) options: &'a ForeignOptions,
+    pub(super) token: &'a CancelToken,
+    /// Loads meshes.
+    pub(super) containers: &'a GltfContainers,
+    /// Folder to which an import copies the assets. `None` if they stay in place.
+    pub(super) asset_folder: Option<&'a str>,
+    pub(super) errors: Vec<Diagnostic>,
+    pub(super) notes: NoteCollector,
+    pub(super) document: SceneDocumentBuilder,
+    pub(super) companions: Vec<Companion>,
+    /// Names in the document, by kind of table.
+    pub(super) material_names: UsedNames,
+    pub(super) texture_names: UsedNames,
+    pub(super) shape_names: UsedNames,
+    pub(super) group_names: UsedNames,
+    /// Names of the materials that are in the document. `None` marks invisible surfaces.
+    pub(super) materials: HashMap<MaterialKey, Option<String>>,
+    /// Names of the textures that are in the document, by their keys.
+    pub(super) textures: HashMap<String, String>,
+    /// Names of the groups in the document. `None` marks groups without visible shapes.
+    pub(super) groups: HashMap<ObjectIndex, Option<String>>,
+    /// Names of the files that an import writes, by source.
+    pub(super) asset_names: BTreeMap<PathBuf, String>,
+    pub(super) used_asset_names: UsedNames,
+    /// Properties reported as unused.
+    pub(super) reported_unused: HashSet<ObjectIndex>,
+    pub(super) has_environment: bool,
+    /// Name of the black material, if it is in the document.
+    pub(super) black: Option<String>,
+    /// Integrals of plastic coats, by index of refraction, α and distribution.
+    pub(super) plastic_coats: HashMap<(u64, Option<u64>, bool), PlasticCoat>,
+}
+
+impl<'a> SceneReader<'a> {
+    pub(super) fn new(
+        graph: &'a SceneGraph,
+        files: &'a SourceFiles,
+        path: &'a Path,
+        folders: &'a [PathBuf],
+        asset_folder: Option<&'a str>,
+        context: &ForeignReadContext<'a>,
+    ) -> Self {
+        let ForeignReadContext { options, token, containers, .. } = *context;
+        Self {
+            graph,
+            files,
+            path,
+            folders,
+            options,
+            token,
+            containers,
+            asset_folder,
+            errors: Vec::new(),
+            notes: NoteCollector::default(),
+            document: SceneDocumentBuilder::default(),
+            companions: Vec::new(),
+            material_names: UsedNames::default(),
+            texture_names: UsedNames::default(),
+            shape_names: UsedNames::default(),
+            group_names: UsedNames::default(),
+            materials: HashMap::new(),
+            textures: HashMap::new(),
+            groups: HashMap::new(),
+            asset_names: BTreeMap::new(),
+            used_asset_names: UsedNames::default(),
+            reported_unused: HashSet::new(),
+            has_environment: false,
+            black: None,
+            plastic_coats: HashMap::new(),
+        }
+    }
+
+    /// Returns an object. The result does not borrow the reader.
+    pub(super) fn object(&self, index: ObjectIndex) -> &'a Object {
+        &self.graph.objects[index]
+    }
+
+    /// Reports an error.
+    pub(super) fn error(&mut self, span: Range<usize>, message: impl Into<String>, help: Option<String>) {
+        if self.errors.len() < MAX_ERRORS {
+            self.errors.push(self.files.diagnostic(Severity::Error, span, message, "", help));
+        }
+    }
+
+    /// Reports a feature that glimt lacks and cannot replace.
+    pub(super) fn refuse(&mut self, object: &Object, what: &str) {
+        let message = format!("glimt does not render {what} (`{}`)", shorten(&object.plugin));
+        let help = "remove it, or render this scene with Mitsuba".to_owned();
+        self.error(object.span.clone(), message, Some(help));
+    }
+
+    /// Reports a plugin that neither Mitsuba nor glimt knows.
+    pub(super) fn unknown_plugin(&mut self, object: &Object, kind: &str, known: &[&str]) {
+        let near = nearest_name(&object.plugin, known.iter().copied());
+        let help = match near {
+            Some(near) => format!("did you mean `{near}`?"),
+            None => format!("expected one of {}", known.join(", ")),
+        };
+        self.error(object.span.clone(), format!("unknown {kind} `{}`", shorten(&object.plugin)), Some(help));
+    }
+
+    pub(super) fn wrong_type(
+        &mut self,
+        span: &Range<usize>,
+        name: &str,
+        expected: &str,
+        found: &PropertyValue,
+    ) {
+        let message = format!("`{}` must be {expected}, found {}", shorten(name), found.type_name());
+        self.error(span.clone(), message, None);
+    }
+
+    /// Returns a number.
+    pub(super) fn float(&mut self, object: &Object, name: &str) -> Option<f64> {
+        let property = object.property(name)?;
+        match &property.value {
+            PropertyValue::Float(number) => Some(*number),
+            PropertyValue::Integer(number) => Some(*number as f64),
+            PropertyValue::Spectrum(SpectrumValue::Uniform(number)) => Some(*number),
+            other => {
+                self.wrong_type(&property.span, name, "a float", other);
+                None
+            }
+        }
+    }
+
+    /// Returns an integer.
+    pub(super) fn integer(&mut self, object: &Object, name: &str) -> Option<i64> {
+        let property = object.property(name)?;
+        match &property.value {
+            PropertyValue::Integer(number) => Some(*number),
+            PropertyValue::Float(number) if number.fract() == 0.0 => Some(*number as i64),
+            other => {
+                self.wrong_type(&property.span, name, "an integer", other);
+                None
+            }
+        }
+    }
+
+    /// Returns a boolean.
+    pub(super) fn boolean(&mut self, object: &Object, name: &str, default: bool) -> bool {
+        let Some(property) = object.property(name) else { return default };
+        match &property.value {
+            PropertyValue::Boolean(flag) => *flag,
+            other => {
+                self.wrong_type(&property.span, name, "a boolean", other);
+                default
+            }
+        }
+    }
+
+    /// Returns a string and its span.
+    pub(super) fn text(&mut self, object: &'a Object, name: &str) -> Option<(&'a str, Range<usize>)> {
+        let property = object.property(name)?;
+        match &property.value {
+            PropertyValue::Text(text) => Some((text, property.span.clone())),
+            other => {
+                self.wrong_type(&property.span, name, "a string", other);
+                None
+            }
+        }
+    }
+
+    /// Returns a vector.
+    pub(super) fn vector(&mut self, object: &Object, name: &str) -> Option<DVec3> {
+        let property = object.property(name)?;
+        match &property.value {
+            PropertyValue::Vector(vector) => Some(*vector),
+            other => {
+                self.wrong_type(&property.span, name, "a vector", other);
+                None
+            }
+        }
+    }
+
+    /// Returns a transform.
+    pub(super) fn transform_value(&mut self, object: &Object, name: &str) -> Option<TransformValue> {
+        let property = object.property(name)?;
+        match &property.value {
+            PropertyValue::Transform(transform) => Some(*transform),
+            other => {
+                self.wrong_type(&property.span, name, "a transform", other);
+                None
+            }
+        }
+    }
+
+    /// Returns the matrix of `to_world`, or the identity.
+    pub(super) fn world_matrix(&mut self, object: &Object) -> DMat4 {
+        self.transform_value(object, "to_world").map_or(DMat4::IDENTITY, |transform| transform.matrix)
+    }
+
+    /// Returns the nested objects of a kind.
+    pub(super) fn children_of_kind(
+        &self,
+        object: &'a Object,
+        kind: ObjectKind,
+    ) -> impl Iterator<Item = &'a Child> + use<'a> {
+        let graph = self.graph;
+        object.children.iter().filter(move |child| graph.objects[child.target].kind == kind)
+    }
+
+    /// Adds the entries to the current table.
+    pub(super) fn set_all(&mut self, entries: Entries) {
+        for (key, value) in entries {
+            self.document.set(key, value);
+        }
+    }
+
+    /// Notes properties of an object that no function has read.
+    pub(super) fn report_unused(&mut self, index: ObjectIndex) {
+        /// Properties without an effect on the image in glimt.
+        const IRRELEVANT: [&str; 12] = [
+            "name",
+            "sample_visible",
+            "rr_depth",
+            "silent",
+            "max_smooth_angle",
+            "collapse",
+            "sampling_weight",
+            "shutter_open",
+            "shutter_close",
+            "max_compile_time",
+            "strict_normals",
+            "approximate",
+        ];
+        let object = self.object(index);
+        if !self.reported_unused.insert(index) {
+            return;
+        }
+        for property in object.properties.iter().filter(|one| !one.is_used.get()) {
+            if IRRELEVANT.contains(&property.name.as_str()) {
+                continue;
+            }
+            let subject = format!("`{}` of `{}`", shorten(&property.name), shorten(&object.plugin));
+            self.notes.note(&subject, "ignored", property.span.clone());
+        }
+    }
+}
+
+/// Relative luminance of a linear color.
+pub(super) fn luminance(color: DVec3) -> f64 {
+    color.dot(DVec3::new(0.212_671, 0.715_16, 0.072_169))
+}

@@ -1,0 +1,383 @@
+//! Converts textures.
+
+use super::graph::{Object, ObjectIndex, ObjectKind};
+use super::material_key::UvConvention;
+use super::reader::{ColorRole, ColorSource, Entries, SceneReader, luminance};
+use super::settings::span_of;
+use super::xml::shorten;
+use crate::formats::rounding::{shorten as shorten_number, shorten_color};
+use crate::math::{DMat4, DVec3};
+use crate::scene::BuiltValue;
+
+/// What a texture is used for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) enum TextureUse {
+    Color,
+    Number,
+    Normal,
+}
+
+/// Extensions of images with linear floating-point values.
+const FLOAT_IMAGES: [&str; 4] = ["exr", "hdr", "pfm", "rgbe"];
+/// Extensions of images that glimt reads.
+const IMAGES: [&str; 14] =
+    ["png", "jpg", "jpeg", "ppm", "pgm", "pbm", "pfm", "tga", "bmp", "hdr", "rgbe", "exr", "webp", "apng"];
+
+/// A map of texture coordinates: a linear map of two rows, then an offset.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct UvMap {
+    rows: [[f64; 2]; 2],
+    offset: [f64; 2],
+}
+
+impl UvMap {
+    /// Combines the shape's convention and the texture's `to_uv`. Images are flipped, because Mitsuba's v = 0
+    /// is their top row.
+    fn new(to_uv: &DMat4, uv: UvConvention, is_image: bool) -> Self {
+        let flip = |flips: bool| if flips { (-1.0, 1.0) } else { (1.0, 0.0) };
+        let [(scale_u, offset_u), (scale_v, offset_v)] = [flip(uv.flips_u), flip(uv.flips_v)];
+        let row = |index: usize| {
+            let row = to_uv.row(index);
+            let linear = [row.x * scale_u, row.y * scale_v];
+            (linear, row.x * offset_u + row.y * offset_v + row.w)
+        };
+        let ((first, first_offset), (second, second_offset)) = (row(0), row(1));
+        if is_image {
+            let flipped = [-second[0], -second[1]];
+            return Self { rows: [first, flipped], offset: [first_offset, 1.0 - second_offset] };
+        }
+        Self { rows: [first, second], offset: [first_offset, second_offset] }
+    }
+
+    /// Returns the keys `repeat`, `rotate` and `offset`, or `None` if the map shears or is degenerate.
+    fn keys(&self) -> Option<Entries> {
+        let [[a, b], [c, d]] = self.rows;
+        let (first, second) = (libm::hypot(a, c), libm::hypot(b, d));
+        let is_valid = first > 1e-12 && second > 1e-12 && first.is_finite() && second.is_finite();
+        if !is_valid || (a * b + c * d).abs() > 1e-6 * first * second {
+            return None;
+        }
+        let mut keys = Entries::new();
+        let (repeat, angle) = if b.abs() <= 1e-9 * second && c.abs() <= 1e-9 * first {
+            ([a, d], 0.0)
+        } else {
+            // The columns are rotated axes; the second may be mirrored.
+            ([first, (a * d - b * c) / first], libm::atan2(c, a).to_degrees())
+        };
+        if repeat != [1.0; 2] {
+            keys.push(("repeat", repeat.map(shorten_number).into()));
+        }
+        if angle != 0.0 {
+            keys.push(("rotate", shorten_number(angle).into()));
+        }
+        // Whole repetitions do not matter to repeated textures, but they do to clamped ones.
+        if self.offset != [0.0; 2] {
+            keys.push(("offset", self.offset.map(shorten_number).into()));
+        }
+        Some(keys)
+    }
+}
+
+impl<'a> SceneReader<'a> {
+    /// Returns the name of a texture, adding it if it is new. Returns `None` if the texture is constant or
+    /// missing.
+    pub(super) fn texture(
+        &mut self,
+        index: ObjectIndex,
+        usage: TextureUse,
+        uv: UvConvention,
+    ) -> Option<String> {
+        self.texture_with_factor(index, usage, uv, 1.0)
+    }
+
+    /// Like [`Self::texture`], with a factor on the colors.
+    pub(super) fn texture_with_factor(
+        &mut self,
+        index: ObjectIndex,
+        usage: TextureUse,
+        uv: UvConvention,
+        factor: f64,
+    ) -> Option<String> {
+        let object = self.object(index);
+        let (keys, wanted) = match object.plugin.as_str() {
+            "bitmap" | "ldrtexture" | "exrtexture" => self.bitmap_keys(object, usage, uv)?,
+            "checkerboard" => (self.checkerboard_keys(object, usage, uv)?, "checker".to_owned()),
+            "scale" => {
+                let inner = self.children_of_kind(object, ObjectKind::Texture).next()?.target;
+                let scale =
+                    self.float(object, "scale").or_else(|| self.float(object, "value")).unwrap_or(1.0);
+                self.report_unused(index);
+                return self.texture_with_factor(inner, usage, uv, factor * scale);
+            }
+            "mesh_attribute" | "vertexcolors" | "vertex_color" => {
+                let text = "replaced by its usual value, gray";
+                self.notes.substitute_light(&format!("`{}`", object.plugin), text, object.span.clone());
+                return None;
+            }
+            "gridtexture" | "wireframe" | "curvature" | "volume" => {
+                let text = "replaced by gray";
+                self.notes.substitute_light(
+                    &format!("texture `{}`", object.plugin),
+                    text,
+                    object.span.clone(),
+                );
+                return None;
+            }
+            _ => {
+                self.unknown_plugin(
+                    object,
+                    "texture",
+                    &["bitmap", "checkerboard", "mesh_attribute", "volume", "scale"],
+                );
+                return None;
+            }
+        };
+        self.report_unused(index);
+        let mut keys = keys;
+        if factor != 1.0 {
+            keys.push(("factor", shorten_number(factor).into()));
+        }
+        let identity = format!("{keys:?}");
+        if let Some(known) = self.textures.get(&identity) {
+            return Some(known.clone());
+        }
+        let name = self.texture_names.make_unique(object.id.as_deref().unwrap_or(&wanted), "texture");
+        self.document.set_span_for_next_values(object.span.clone());
+        self.document.start_named_table("textures", &name);
+        self.set_all(keys);
+        self.textures.insert(identity, name.clone());
+        Some(name)
+    }
+
+    /// The color that replaces a texture without an image.
+    pub(super) fn constant_of_texture(&mut self, index: ObjectIndex, role: ColorRole) -> Option<DVec3> {
+        let object = self.object(index);
+        match object.kind {
+            ObjectKind::Spectrum => Some(self.spectrum_plugin_color(object, role)),
+            _ => None,
+        }
+    }
+
+    /// Returns the value that reads a number from a texture.
+    pub(super) fn number_texture(&mut self, index: ObjectIndex, uv: UvConvention) -> Option<BuiltValue> {
+        let name = self.texture(index, TextureUse::Number, uv)?;
+        Some(self.channel_value(index, name))
+    }
+
+    /// Returns the value of a roughness √α whose α is a texture.
+    pub(super) fn roughness_texture(&mut self, index: ObjectIndex, uv: UvConvention) -> Option<BuiltValue> {
+        let object = self.object(index);
+        if object.plugin == "checkerboard" {
+            // The two values can be converted exactly.
+            let name = self.checkerboard_of_roots(index, uv)?;
+            return Some(BuiltValue::Table(vec![("texture", name.into())]));
+        }
+        let text = "used as √α instead of α";
+        self.notes.substitute_light("a texture of `alpha`", text, object.span.clone());
+        self.number_texture(index, uv)
+    }
+
+    /// Returns the value of `bump`.
+    pub(super) fn height_texture(&mut self, index: ObjectIndex, uv: UvConvention) -> Option<BuiltValue> {
+        let name = self.texture(index, TextureUse::Number, uv)?;
+        Some(name.into())
+    }
+
+    /// Returns the value that reads the luminance of a texture as a number. Images with an alpha channel need
+    /// a channel, because glimt's opacity is alpha by default.
+    fn channel_value(&mut self, index: ObjectIndex, name: String) -> BuiltValue {
+        let object = self.object(index);
+        let has_alpha = self.image_may_have_alpha(object);
+        let mut entries = vec![("texture", name.into())];
+        if has_alpha {
+            entries.push(("channel", "r".into()));
+        }
+        BuiltValue::Table(entries)
+    }
+
+    /// Whether an image may have an alpha channel: reads the color type of PNG files.
+    fn image_may_have_alpha(&mut self, object: &'a Object) -> bool {
+        let Some((name, span)) = self.text(object, "filename") else { return false };
+        let Some(path) = self.find_file(name, &span) else { return false };
+        match extension(&path.to_string_lossy()).as_str() {
+            "png" | "apng" => {
+                use std::io::Read;
+                let mut start = [0; 33];
+                let read = std::fs::File::open(&path).and_then(|mut file| file.read_exact(&mut start));
+                read.is_ok() && matches!(start[25], 4 | 6)
+            }
+            "tga" | "webp" | "exr" | "bmp" => true,
+            _ => false,
+        }
+    }
+
+    fn bitmap_keys(
+        &mut self,
+        object: &'a Object,
+        usage: TextureUse,
+        uv: UvConvention,
+    ) -> Option<(Entries, String)> {
+        let Some((name, span)) = self.text(object, "filename") else {
+            self.error(object.span.clone(), "the texture needs `filename`", None);
+            return None;
+        };
+        let kind = extension(name);
+        if !IMAGES.contains(&kind.as_str()) {
+            let help = format!("convert it to one of {}", IMAGES[..12].join(", "));
+            self.error(span, format!("glimt cannot read .{} images", shorten(&kind)), Some(help));
+            return None;
+        }
+        let mut keys: Entries = vec![("file", self.asset(name, &span, "image")?.into())];
+        match self.text(object, "filter_type") {
+            None | Some(("bilinear" | "trilinear" | "ewa", _)) => {}
+            Some(("nearest", _)) => keys.push(("filter", "nearest".into())),
+            Some((other, span)) => {
+                let help = "expected bilinear or nearest".to_owned();
+                self.error(span, format!("unknown filter `{}`", shorten(other)), Some(help));
+            }
+        }
+        let wrap = self.text(object, "wrap_mode").or_else(|| self.text(object, "wrap_mode_u"));
+        match wrap {
+            None | Some(("repeat", _)) => {}
+            Some(("mirror", _)) => keys.push(("wrap", "mirror".into())),
+            Some(("clamp", _)) => keys.push(("wrap", "clamp".into())),
+            Some((other, span)) => {
+                let help = "expected repeat, mirror or clamp".to_owned();
+                self.error(span, format!("unknown wrap mode `{}`", shorten(other)), Some(help));
+            }
+        }
+        for name in ["wrap_mode_v", "max_anisotropy", "cache", "format"] {
+            object.property(name);
+        }
+        let is_raw = self.boolean(object, "raw", false);
+        let gamma = self.float(object, "gamma");
+        let is_float = FLOAT_IMAGES.contains(&kind.as_str());
+        if !is_float && usage != TextureUse::Normal {
+            let is_linear = is_raw || gamma == Some(1.0);
+            keys.push(("encoding", if is_linear { "linear" } else { "srgb" }.into()));
+        } else if usage == TextureUse::Normal && !is_raw && !is_float {
+            let text = "decoded from sRGB in Mitsuba, but read as linear";
+            self.notes.substitute_light("a normal map that is not `raw`", text, object.span.clone());
+        }
+        if let Some(gamma) = gamma
+            && gamma != 1.0
+            && (gamma - 2.2).abs() > 0.01
+            && gamma > 0.0
+        {
+            self.notes.substitute_light("`gamma` of a bitmap", "replaced by sRGB", span_of(object, "gamma"));
+        }
+        keys.extend(self.uv_keys(object, uv, true));
+        let stem = name.rsplit(['/', '\\']).next().unwrap_or_default();
+        let stem = stem.rsplit_once('.').map_or(stem, |(stem, _)| stem);
+        Some((keys, stem.to_owned()))
+    }
+
+    fn uv_keys(&mut self, object: &'a Object, uv: UvConvention, is_image: bool) -> Entries {
+        let to_uv =
+            self.transform_value(object, "to_uv").map_or(DMat4::IDENTITY, |transform| transform.matrix);
+        let keys = UvMap::new(&to_uv, uv, is_image).keys();
+        keys.unwrap_or_else(|| {
+            let text = "left out";
+            self.notes.substitute_light("`to_uv` that shears the texture", text, span_of(object, "to_uv"));
+            UvMap::new(&DMat4::IDENTITY, uv, is_image).keys().unwrap_or_default()
+        })
+    }
+
+    /// Colors of a checkerboard, which may not be textures themselves.
+    fn checker_colors(&mut self, object: &'a Object) -> [DVec3; 2] {
+        let mut color =
+            |name: &str, default: f64| match self.color(object, name, ColorRole::Reflectance, default) {
+                ColorSource::Constant(color) => color,
+                ColorSource::Texture(_) => {
+                    self.notes.substitute_light(
+                        "a texture in a checkerboard",
+                        "replaced by gray",
+                        object.span.clone(),
+                    );
+                    DVec3::splat(0.5)
+                }
+            };
+        [color("color0", 0.4), color("color1", 0.2)]
+    }
+
+    fn checkerboard_keys(
+        &mut self,
+        object: &'a Object,
+        usage: TextureUse,
+        uv: UvConvention,
+    ) -> Option<Entries> {
+        let mut colors = self.checker_colors(object);
+        match usage {
+            TextureUse::Color => {}
+            // Mitsuba swaps the colors when it evaluates a checkerboard as a number.
+            TextureUse::Number => colors.reverse(),
+            TextureUse::Normal => {
+                self.error(object.span.clone(), "a checkerboard is not a normal map", None);
+                return None;
+            }
+        }
+        Some(self.checker_keys(object, colors, uv))
+    }
+
+    fn checker_keys(&mut self, object: &'a Object, colors: [DVec3; 2], uv: UvConvention) -> Entries {
+        let colors = colors.map(shorten_color).to_vec();
+        let mut keys: Entries = vec![("type", "checker".into()), ("colors", BuiltValue::Array(colors))];
+        keys.extend(self.uv_keys(object, uv, false));
+        keys
+    }
+
+    /// Adds a checkerboard of α as a texture of √α.
+    fn checkerboard_of_roots(&mut self, index: ObjectIndex, uv: UvConvention) -> Option<String> {
+        let object = self.object(index);
+        let [first, second] = self.checker_colors(object);
+        let root = |color: DVec3| DVec3::splat(libm::sqrt(luminance(color).clamp(1e-4, 1.0)));
+        let keys = self.checker_keys(object, [root(second), root(first)], uv);
+        let identity = format!("{keys:?}");
+        if let Some(known) = self.textures.get(&identity) {
+            return Some(known.clone());
+        }
+        let name = self.texture_names.make_unique("roughness", "texture");
+        self.document.set_span_for_next_values(object.span.clone());
+        self.document.start_named_table("textures", &name);
+        self.set_all(keys);
+        self.textures.insert(identity, name.clone());
+        Some(name)
+    }
+}
+
+/// Returns the extension of a file name in lowercase.
+pub(super) fn extension(name: &str) -> String {
+    name.rsplit_once('.').map_or(String::new(), |(_, extension)| extension.to_lowercase())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn map(uv: UvConvention, to_uv: DMat4, is_image: bool) -> impl Fn(f64, f64) -> [f64; 2] {
+        let UvMap { rows, offset } = UvMap::new(&to_uv, uv, is_image);
+        move |u, v| std::array::from_fn(|index| rows[index][0] * u + rows[index][1] * v + offset[index])
+    }
+
+    #[test]
+    fn uv_maps_follow_mitsubas_order() {
+        let obj = UvConvention { flips_v: true, flips_u: false };
+        assert_eq!(map(obj, DMat4::IDENTITY, true)(0.25, 0.75), [0.25, 0.75]);
+        assert_eq!(map(UvConvention::default(), DMat4::IDENTITY, true)(0.25, 0.75), [0.25, 0.25]);
+        // v scale s and offset t give the offset 1 − s − t.
+        let to_uv = DMat4::from_translation(DVec3::new(0.0, 0.25, 0.0))
+            * DMat4::from_scale(DVec3::new(1.0, 4.0, 1.0));
+        assert_eq!(map(obj, to_uv, true)(0.0, 0.0), [0.0, 1.0 - 4.0 - 0.25]);
+        assert_eq!(map(obj, to_uv, true)(0.0, 1.0), [0.0, 1.0 - 0.25]);
+    }
+
+    #[test]
+    fn rotations_are_decomposed() {
+        let to_uv = DMat4::from_rotation_z(0.5) * DMat4::from_scale(DVec3::new(2.0, 3.0, 1.0));
+        let keys = UvMap::new(&to_uv, UvConvention::default(), false).keys().expect("a map");
+        let names: Vec<_> = keys.iter().map(|(key, _)| *key).collect();
+        assert_eq!(names, ["repeat", "rotate"]);
+        let shear = DMat4::from_scale(DVec3::new(2.0, 3.0, 1.0)) * DMat4::from_rotation_z(0.5);
+        assert!(UvMap::new(&shear, UvConvention::default(), false).keys().is_none());
+    }
+}

@@ -1,0 +1,225 @@
+//! Writes the `[materials]` tables.
+
+use super::lexer::{PbrtError, PbrtResult};
+use super::materials::{BlendPart, MaterialModel};
+use super::scene::{LoweredMaterial, SceneWriter};
+use super::state::{Entity, MaterialReference};
+use super::texture_nodes::TextureNode;
+use super::textures::{Entries, TextureUse, texture_value};
+use crate::formats::rounding::shorten_color;
+use crate::math::DVec3;
+use crate::scene::BuiltValue;
+use crate::scene::nearest::nearest_name;
+use crate::scene::sanitize::escape_and_truncate;
+use std::ops::Range;
+
+/// Light that a shape emits.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Emission {
+    /// Radiance, or the factor on `image`.
+    pub(super) color: DVec3,
+    /// An image of the radiance.
+    pub(super) image: Option<TextureNode>,
+    pub(super) is_two_sided: bool,
+}
+
+/// Properties that pbrt gives to a shape and glimt to its material.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct ShapeProperties {
+    pub(super) emission: Option<Emission>,
+    /// The opacity, if it is not 1.
+    pub(super) alpha: Option<TextureNode>,
+    /// Transmittance per unit of length inside of dielectrics.
+    pub(super) tint: Option<DVec3>,
+}
+
+impl SceneWriter<'_> {
+    /// Returns the material of a shape, and adds its table if it is new.
+    pub(super) fn material(
+        &mut self,
+        reference: &MaterialReference,
+        span: &Range<usize>,
+        properties: &ShapeProperties,
+    ) -> LoweredMaterial {
+        let identity = (reference.clone(), format!("{properties:?}"));
+        if let Some(known) = self.materials.get(&identity) {
+            return known.clone();
+        }
+        let lowered = self.lower_material(reference, span, properties, 0);
+        let lowered = self.attempt(lowered).unwrap_or(LoweredMaterial::Invalid);
+        self.materials.insert(identity, lowered.clone());
+        lowered
+    }
+
+    /// Finds the statement of a material. Also returns its name.
+    fn find_material(
+        &self,
+        reference: &MaterialReference,
+        span: &Range<usize>,
+    ) -> PbrtResult<(&Entity, String)> {
+        let statements = self.statements;
+        match reference {
+            MaterialReference::Index(index) => {
+                let entity = &statements.materials[*index];
+                Ok((entity, entity.kind.text.clone()))
+            }
+            MaterialReference::Named(name) => match statements.named_materials.get(&**name) {
+                Some(entity) => Ok((entity, name.to_string())),
+                None => {
+                    let shown = escape_and_truncate(name, 40);
+                    let near = nearest_name(name, statements.named_materials.keys().map(String::as_str));
+                    let message = format!("there is no material \"{shown}\"");
+                    Err(PbrtError::new(span.clone(), message).with_suggestion(near))
+                }
+            },
+        }
+    }
+
+    fn lower_material(
+        &mut self,
+        reference: &MaterialReference,
+        span: &Range<usize>,
+        properties: &ShapeProperties,
+        depth: usize,
+    ) -> PbrtResult<LoweredMaterial> {
+        /// Maximum depth of mixed materials.
+        const MAX_DEPTH: usize = 16;
+        if depth > MAX_DEPTH {
+            let message = "this material mixes itself, or too many materials are mixed";
+            return Err(PbrtError::new(span.clone(), message));
+        }
+        let (entity, name) = self.find_material(reference, span)?;
+        let (entity, is_named) = (entity.clone(), matches!(reference, MaterialReference::Named(_)));
+        let model = self.read_material(&entity, is_named)?;
+        self.document.set_span_for_next_values(entity.span());
+        match model {
+            MaterialModel::Invisible => Ok(self.lower_invisible(&name, properties)),
+            MaterialModel::Blend { parts, amount } => {
+                self.lower_blend(&name, &parts, &amount, properties, &entity, depth)
+            }
+            MaterialModel::Plain { mut keys, needs_uv, is_glass } => {
+                let has_alpha = properties.alpha.is_some();
+                if is_glass && has_alpha {
+                    let text = "the whole surface exists";
+                    self.notes.substitute("`alpha` of a dielectric", text, entity.span());
+                }
+                if is_glass && let Some(tint) = properties.tint {
+                    keys.push(("tint", shorten_color(tint)));
+                }
+                let uses_image = self.push_shape_keys(&mut keys, properties, is_glass);
+                let table = self.add_material_table(keys, &name, &entity.span());
+                Ok(LoweredMaterial::Table {
+                    name: table,
+                    needs_uv: needs_uv || uses_image,
+                    has_inside: is_glass,
+                })
+            }
+        }
+    }
+
+    /// An interface has no surface, unless it emits light.
+    fn lower_invisible(&mut self, name: &str, properties: &ShapeProperties) -> LoweredMaterial {
+        if properties.emission.is_none() {
+            return LoweredMaterial::Invisible;
+        }
+        let span = 0..0;
+        self.notes.substitute("a light with the material `interface`", "its surface is black", span.clone());
+        let mut keys: Entries = vec![("diffuse", 0.0.into())];
+        let needs_uv = self.push_shape_keys(&mut keys, properties, false);
+        let name = self.add_material_table(keys, name, &span);
+        LoweredMaterial::Table { name, needs_uv, has_inside: false }
+    }
+
+    fn lower_blend(
+        &mut self,
+        name: &str,
+        parts: &[BlendPart; 2],
+        amount: &TextureNode,
+        properties: &ShapeProperties,
+        entity: &Entity,
+        depth: usize,
+    ) -> PbrtResult<LoweredMaterial> {
+        let mut names = Vec::new();
+        for BlendPart { name, span } in parts {
+            let reference = MaterialReference::Named(name.as_str().into());
+            let lowered = self.lower_material(&reference, span, properties, depth + 1)?;
+            match lowered {
+                LoweredMaterial::Table { name, has_inside: false, .. } => names.push(name),
+                LoweredMaterial::Table { .. } => {
+                    let text = "only the other material is used";
+                    self.notes.substitute_light("`mix` with a dielectric", text, span.clone());
+                }
+                LoweredMaterial::Invisible => {
+                    let message = "an interface cannot be mixed";
+                    return Err(PbrtError::new(span.clone(), message));
+                }
+                LoweredMaterial::Invalid => return Ok(LoweredMaterial::Invalid),
+            }
+        }
+        let table = |name: String| LoweredMaterial::Table { name, needs_uv: true, has_inside: false };
+        match &names[..] {
+            [] => {
+                let message = "glimt cannot mix two dielectrics";
+                Err(PbrtError::new(entity.span(), message))
+            }
+            [only] => Ok(table(only.clone())),
+            [first, second, ..] if first == second => Ok(table(first.clone())),
+            [first, second, ..] => {
+                let both = [first, second].map(|name| BuiltValue::from(name.clone())).to_vec();
+                let weight = match amount.as_constant() {
+                    Some(weight) => weight.x.clamp(0.0, 1.0).into(),
+                    None => self.number_value(amount),
+                };
+                let keys = vec![
+                    ("type", "blend".into()),
+                    ("materials", BuiltValue::Array(both)),
+                    ("weight", weight),
+                ];
+                Ok(table(self.add_material_table(keys, name, &entity.span())))
+            }
+        }
+    }
+
+    /// Adds the keys of a shape's properties. Returns whether an image is used.
+    fn push_shape_keys(&mut self, keys: &mut Entries, properties: &ShapeProperties, is_glass: bool) -> bool {
+        let mut uses_image = false;
+        if let Some(Emission { color, image, is_two_sided }) = &properties.emission {
+            let value = match image {
+                None => shorten_color(*color),
+                Some(image) => {
+                    uses_image = true;
+                    let BuiltValue::Table(mut entries) =
+                        texture_value(self.texture(image, TextureUse::Color))
+                    else {
+                        return true;
+                    };
+                    if *color != DVec3::ONE {
+                        entries.push(("scale", shorten_color(*color)));
+                    }
+                    BuiltValue::Table(entries)
+                }
+            };
+            keys.push(("emission", value));
+            if *is_two_sided {
+                keys.push(("emission_sides", "both".into()));
+            }
+        }
+        if let Some(alpha) = properties.alpha.as_ref().filter(|_| !is_glass) {
+            uses_image |= alpha.as_constant().is_none();
+            let value = match alpha.as_constant() {
+                Some(alpha) => alpha.x.clamp(0.0, 1.0).into(),
+                None => self.number_value(alpha),
+            };
+            keys.push(("opacity", value));
+        }
+        uses_image
+    }
+
+    fn add_material_table(&mut self, keys: Entries, wanted: &str, span: &Range<usize>) -> String {
+        let name = self.material_names.make_unique(wanted, "material");
+        self.document.set_span_for_next_values(span.clone());
+        self.document.start_named_table("materials", &name);
+        keys.into_iter().for_each(|(key, value)| self.document.set(key, value));
+        name
+    }
+}

@@ -1,0 +1,62 @@
+//! Results of work on files that are kept between two versions of a scene, so that an edit of the text does not
+//! repeat it.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::sync::{LazyLock, Mutex, PoisonError};
+
+use crate::system::file::FileStamp;
+
+/// Maximum number of images to remember.
+const MAX_IMAGES: usize = 10_000;
+
+static GRAY_IMAGES: LazyLock<Mutex<HashMap<PathBuf, (FileStamp, bool)>>> = LazyLock::new(Mutex::default);
+
+static ENVIRONMENT: Mutex<Option<(String, Vec<u8>)>> = Mutex::new(None);
+
+/// Returns whether the image with this stamp is gray, if it has been asked before. Otherwise, calls `find`.
+pub(super) fn is_gray(path: &Path, stamp: Option<FileStamp>, find: impl FnOnce() -> bool) -> bool {
+    let lock = || GRAY_IMAGES.lock().unwrap_or_else(PoisonError::into_inner);
+    let known = lock().get(path).filter(|(known, _)| Some(*known) == stamp).map(|(_, is_gray)| *is_gray);
+    known.unwrap_or_else(|| {
+        let is_gray = find();
+        if let Some(stamp) = stamp {
+            let mut images = lock();
+            if images.len() >= MAX_IMAGES {
+                images.clear();
+            }
+            images.insert(path.to_owned(), (stamp, is_gray));
+        }
+        is_gray
+    })
+}
+
+/// Returns the last environment map if it has the same key. Otherwise, calls `make`.
+pub(super) fn environment(key: String, make: impl FnOnce() -> Vec<u8>) -> Vec<u8> {
+    let lock = || ENVIRONMENT.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some((_, bytes)) = lock().as_ref().filter(|(known, _)| *known == key) {
+        return bytes.clone();
+    }
+    let bytes = make();
+    *lock() = Some((key, bytes.clone()));
+    bytes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn results_depend_on_stamps_and_keys() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a");
+        std::fs::write(&path, "a").expect("written");
+        let stamp = FileStamp::from_path(&path);
+        assert!(is_gray(&path, stamp, || true));
+        assert!(is_gray(&path, stamp, || false), "kept");
+        std::fs::write(&path, "ab").expect("written");
+        assert!(!is_gray(&path, FileStamp::from_path(&path), || false));
+        assert_eq!(environment("first of test".to_owned(), || vec![1]), [1]);
+        assert_eq!(environment("second of test".to_owned(), || vec![2]), [2]);
+    }
+}

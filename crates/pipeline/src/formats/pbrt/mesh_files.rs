@@ -1,0 +1,148 @@
+//! Writes shapes whose mesh is in a file.
+
+use std::io::Read;
+use std::path::Path;
+
+use super::lexer::{PbrtError, PbrtResult};
+use super::meshes::MeshData;
+use super::parameters::{Parameters, Text};
+use super::scene::SceneWriter;
+use super::shapes::Placement;
+use crate::assets::mesh::{load, load_from_bytes};
+use crate::assets::{AssetError, Companion, LoadedMesh, read_gzip_file};
+use crate::control::ignore_progress;
+use crate::formats::foreign::transform::matrix_value;
+use crate::math::DMat4;
+
+/// Maximum size of a decompressed mesh.
+const MAX_MESH_BYTES: u64 = 4 << 30;
+/// Files below this size are read early, to skip meshes without area.
+const SMALL_FILE_BYTES: u64 = 2048;
+/// Start of the message for a mesh without area.
+const NO_USABLE_FACE: &str = "no usable face";
+
+/// What a reader needs to know about a mesh file before it is loaded.
+struct MeshHeader {
+    has_normals: bool,
+    has_uvs: bool,
+    size: u64,
+}
+
+impl SceneWriter<'_> {
+    /// Writes a `plymesh`. The file is read later, with all others, unless its faces must be turned.
+    pub(super) fn write_mesh_file(
+        &mut self,
+        parameters: &Parameters,
+        placement: &Placement<'_>,
+    ) -> PbrtResult<()> {
+        let file = mesh_file_name(parameters)?.clone();
+        if parameters.find("displacement").is_some() {
+            let text = "the surface keeps its shape";
+            let span = parameters.span_of("displacement");
+            self.notes.substitute("`displacement` of a shape", text, span);
+        }
+        parameters.ignore(&["edgelength", "displacement.edgelength"]);
+        if self.is_tolerated_missing(&file, "mesh", "skipped") {
+            return Ok(());
+        }
+        let header = read_header(&self.asset_path(&file.text));
+        let is_compressed = is_gzip(&file.text);
+        let must_read = header.as_ref().is_some_and(|header| {
+            header.size < SMALL_FILE_BYTES
+                || placement.is_reversed
+                || placement.emits && header.has_normals
+                || placement.needs_uv && !header.has_uvs
+        });
+        if is_compressed || must_read {
+            match self.load_mesh_file(parameters)? {
+                Some(data)
+                    if is_compressed || placement.emits || placement.needs_uv && data.uvs.is_empty() =>
+                {
+                    self.write_mesh_data(data, &stem(&file.text), placement);
+                    return Ok(());
+                }
+                Some(_) => {}
+                None => {
+                    self.notes.note("a mesh without area", "skipped", file.span);
+                    return Ok(());
+                }
+            }
+        }
+        self.document.set_span_for_next_values(placement.span.clone());
+        match placement.group {
+            Some(group) => self.document.group_list_table(group, "mesh"),
+            None => self.document.start_list_table("mesh"),
+        }
+        self.document.set("material", placement.material.clone());
+        let name = self.asset_name(&file);
+        self.document.set("file", name);
+        self.document.set_span_for_next_values(placement.span.clone());
+        if header.is_some_and(|header| !header.has_normals) {
+            self.document.set("smooth", false);
+        }
+        if placement.matrix != DMat4::IDENTITY {
+            self.document.set("matrix", matrix_value(&placement.matrix));
+        }
+        Ok(())
+    }
+
+    /// Reads the mesh of a `plymesh`. Returns `None` if it has no area.
+    pub(super) fn load_mesh_file(&mut self, parameters: &Parameters) -> PbrtResult<Option<MeshData>> {
+        let file = mesh_file_name(parameters)?;
+        let path = self.asset_path(&file.text);
+        match self.load_plain_or_gzip(&path) {
+            Ok(loaded) => Ok(Some(MeshData::from_loaded(&loaded))),
+            Err(AssetError::Malformed { reason, .. }) if reason.starts_with(NO_USABLE_FACE) => Ok(None),
+            Err(error) => Err(PbrtError::new(file.span.clone(), error.to_string())),
+        }
+    }
+
+    fn load_plain_or_gzip(&mut self, path: &Path) -> Result<LoadedMesh, AssetError> {
+        if !is_gzip(&path.to_string_lossy()) {
+            let loaded = load(path, &ignore_progress, self.token);
+            let hash = loaded.as_ref().ok().map(|loaded| loaded.hash);
+            self.companions.push(Companion { path: path.to_owned(), hash, stamp: None });
+            return loaded;
+        }
+        let file = read_gzip_file(path, MAX_MESH_BYTES, self.token);
+        let (hash, stamp) = file.as_ref().map_or((None, None), |file| (Some(file.hash), file.stamp));
+        self.companions.push(Companion { path: path.to_owned(), hash, stamp });
+        load_from_bytes(&path.with_extension(""), &file?.bytes, &ignore_progress, self.token)
+    }
+}
+
+fn mesh_file_name(parameters: &Parameters) -> PbrtResult<&Text> {
+    let missing = || PbrtError::new(parameters.span.clone(), "this mesh has no `filename`");
+    parameters.string("filename")?.ok_or_else(missing)
+}
+
+fn is_gzip(file: &str) -> bool {
+    file.to_lowercase().ends_with(".gz")
+}
+
+fn stem(file: &str) -> String {
+    let name = Path::new(file).file_name().unwrap_or_default().to_string_lossy().into_owned();
+    name.split('.').next().unwrap_or_default().to_owned()
+}
+
+/// Reads the header of a PLY file. Returns `None` if the file is not readable, which is reported when it is
+/// loaded.
+fn read_header(path: &Path) -> Option<MeshHeader> {
+    /// Maximum size of a header.
+    const MAX_HEADER: u64 = 4096;
+    let (file, metadata) = crate::system::file::open_regular_file(path).ok()?.ok()?;
+    let mut bytes = Vec::new();
+    file.take(MAX_HEADER).read_to_end(&mut bytes).ok()?;
+    let text = String::from_utf8_lossy(&bytes);
+    let header = text.split("end_header").next().unwrap_or_default();
+    let has = |names: &[&str]| {
+        let is_property = |line: &str| {
+            line.starts_with("property")
+                && names.contains(&line.split_whitespace().last().unwrap_or_default())
+        };
+        header.lines().any(|line| is_property(line.trim()))
+    };
+    let has_normals = has(&["nx"]);
+    let has_uvs = has(&["u", "s", "texture_u", "texture_s"]);
+    Some(MeshHeader { has_normals, has_uvs, size: metadata.len() })
+}

@@ -1,0 +1,121 @@
+//! Reads and imports pbrt-v4 scenes.
+//!
+//! [`parser`] collects the statements of all files, [`texture_nodes`] resolves textures, and [`scene`] writes
+//! the tables of a scene document. The world keeps its left-handed coordinates: only the camera mirrors the
+//! image. Facts about the format are from pbrt-v4's documentation and, where it is silent, from its behavior.
+
+mod bake;
+mod colors;
+mod emitters;
+mod environment;
+mod lexer;
+mod lights;
+mod material_tables;
+mod materials;
+mod memo;
+mod mesh_files;
+mod meshes;
+mod objects;
+mod parameters;
+mod parser;
+mod pixels;
+mod scene;
+mod settings;
+mod shapes;
+mod state;
+#[cfg(test)]
+mod tests;
+mod texture_nodes;
+mod textures;
+mod values;
+
+use std::path::{Path, PathBuf};
+
+use self::colors::ColorReader;
+use self::lexer::PbrtError;
+use self::parser::Parser;
+use self::scene::{AssetLocation, SceneWriter};
+use self::texture_nodes::TextureResolver;
+use super::foreign::ForeignError;
+use super::foreign::sources::SourceReader;
+use super::{ForeignReadContext, ForeignScene, ImportedScene, scene_from_document};
+use crate::assets::{AssetError, Companion};
+use crate::scene::diagnostic::{Diagnostic, Severity};
+use crate::scene::{SceneDocumentBuilder, SourceFiles};
+
+/// Reads a scene.
+pub(super) fn read(path: &Path, context: &ForeignReadContext<'_>) -> Result<ForeignScene, ForeignError> {
+    read_scene(path, None, context).map(|(scene, _)| scene)
+}
+
+/// Converts a scene to a scene file, and to files in `folder` that contain its meshes and images.
+pub(super) fn convert(
+    path: &Path,
+    folder: &str,
+    context: &ForeignReadContext<'_>,
+) -> Result<ImportedScene, ForeignError> {
+    check_rendered_scene(path, context)?;
+    let (ForeignScene { document, substitutions, .. }, copies) = read_scene(path, Some(folder), context)?;
+    let mut files: Vec<(PathBuf, Vec<u8>)> = Vec::new();
+    for (name, source) in copies {
+        context.token.check_pause_and_cancel()?;
+        let bytes = std::fs::read(&source).map_err(|error| {
+            AssetError::malformed(&source, None, format!("cannot read the file: {error}"))
+        })?;
+        files.push((PathBuf::from(name), bytes));
+    }
+    let generated = document.generated_files().iter();
+    files.extend(generated.map(|(name, file)| (PathBuf::from(name), file.bytes.to_vec())));
+    Ok(ImportedScene { document, files, substitutions })
+}
+
+/// Rejects a scene that `glimt check` would reject.
+fn check_rendered_scene(path: &Path, context: &ForeignReadContext<'_>) -> Result<(), ForeignError> {
+    let ForeignScene { document, companions, .. } = read(path, context)?;
+    scene_from_document(document, path, &[])
+        .map(|_| ())
+        .map_err(|diagnostics| ForeignError::Scene { diagnostics, companions })
+}
+
+/// Reads a scene. `import` is the folder for the assets of an imported scene. Also returns the files to copy
+/// into it.
+fn read_scene(
+    path: &Path,
+    import: Option<&str>,
+    context: &ForeignReadContext<'_>,
+) -> Result<(ForeignScene, Vec<(String, PathBuf)>), ForeignError> {
+    let mut sources = SourceReader::default();
+    let Parser { errors, statements, .. } = parser::parse(path, &mut sources, context.token)?;
+    if !errors.is_empty() {
+        return Err(scene_error(&errors, &sources.files, sources.companions));
+    }
+    let SourceReader { files, hash, mut companions, .. } = sources;
+    let colors = ColorReader::new(path.parent().unwrap_or(Path::new("")), context.token);
+    let mut writer = SceneWriter::new(
+        &statements,
+        TextureResolver::new(&statements, &colors),
+        SceneDocumentBuilder::from_files(files.clone()),
+        AssetLocation::new(path, import),
+        context.options,
+        context.token,
+    );
+    writer.write_all();
+    context.token.check_pause_and_cancel()?;
+    let SceneWriter { document, notes, errors, assets, companions: read, .. } = writer;
+    companions.extend(read);
+    companions.append(&mut colors.companions.borrow_mut());
+    if !errors.is_empty() {
+        return Err(scene_error(&errors, &files, companions));
+    }
+    let (notes, substitutions) = notes.into_diagnostics(&files);
+    Ok((ForeignScene { document, hash, companions, notes, substitutions }, assets.copies))
+}
+
+fn scene_error(errors: &[PbrtError], files: &SourceFiles, companions: Vec<Companion>) -> ForeignError {
+    let diagnostic = |error: &PbrtError| {
+        let PbrtError { message, span, label, help } = error.clone();
+        files.diagnostic(Severity::Error, span, message, label, help)
+    };
+    let diagnostics: Vec<Diagnostic> = errors.iter().map(diagnostic).collect();
+    ForeignError::Scene { diagnostics, companions }
+}

@@ -1,0 +1,419 @@
+//! Resolves textures to expressions of images, checkers and constants.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use super::colors::{ColorReader, SpectrumUse};
+use super::lexer::{PbrtError, PbrtResult};
+use super::parameters::{ParameterType, Parameters, Text};
+use super::state::{ColorSpace, PlacedEntity, Statements};
+use crate::formats::foreign::notes::NoteCollector;
+use crate::math::{DVec2, DVec3};
+use crate::scene::nearest::nearest_name;
+use crate::scene::sanitize::escape_and_truncate;
+
+/// Maximum depth of textures that use textures.
+const MAX_DEPTH: usize = 32;
+
+/// Whether a texture is a color or a number. pbrt keeps them apart.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) enum TextureValue {
+    Color(SpectrumUse),
+    Number,
+}
+
+impl TextureValue {
+    /// The value of reflectance textures.
+    pub(super) const REFLECTANCE: Self = Self::Color(SpectrumUse::Reflectance);
+}
+
+/// Texture coordinates: (u, v) · `scale` + `offset`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct UvMapping {
+    pub(super) scale: DVec2,
+    pub(super) offset: DVec2,
+}
+
+impl UvMapping {
+    pub(super) const IDENTITY: Self = Self { scale: DVec2::ONE, offset: DVec2::ZERO };
+}
+
+/// Values outside of the image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum ImageWrap {
+    Repeat,
+    Clamp,
+    Black,
+}
+
+/// Interpolation of texels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum ImageFilter {
+    Nearest,
+    Bilinear,
+    Mipmap,
+}
+
+/// An image.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct ImageNode {
+    pub(super) file: Text,
+    pub(super) mapping: UvMapping,
+    pub(super) wrap: ImageWrap,
+    pub(super) filter: ImageFilter,
+    /// Whether 8- and 16-bit values are linear.
+    pub(super) is_linear: bool,
+    /// Whether the image is a number: the mean of the channels, or alpha if there is one.
+    pub(super) is_number: bool,
+    /// Factor on the values.
+    pub(super) factor: DVec3,
+    /// Whether the value is max(0, 1 − factor · texel).
+    pub(super) is_inverted: bool,
+}
+
+/// A texture.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum TextureNode {
+    Constant(DVec3),
+    Image(ImageNode),
+    /// The first is in the cell at the corner (0, 0), and cells are one unit wide.
+    Checker(UvMapping, Arc<[Self; 2]>),
+    Product(Arc<[Self; 2]>),
+    /// (1 − amount) · first + amount · second.
+    Mix(Arc<[Self; 3]>),
+    /// Values at the corners (0, 0), (0, 1), (1, 0) and (1, 1).
+    Bilinear(UvMapping, Arc<[Self; 4]>),
+    /// A power of a number.
+    Power(Arc<Self>, f64),
+    /// Gradient noise around a mean, with the number of octaves and a factor.
+    Noise {
+        octaves: u32,
+        factor: f64,
+    },
+}
+
+impl TextureNode {
+    /// The value, if it is the same everywhere.
+    pub(super) fn as_constant(&self) -> Option<DVec3> {
+        match self {
+            Self::Constant(value) => Some(*value),
+            Self::Image(_)
+            | Self::Checker(..)
+            | Self::Product(_)
+            | Self::Mix(_)
+            | Self::Bilinear(..)
+            | Self::Power(..)
+            | Self::Noise { .. } => None,
+        }
+    }
+
+    /// Multiplies two textures.
+    pub(super) fn product(first: Self, second: Self) -> Self {
+        match (first, second) {
+            (Self::Constant(factor), other) | (other, Self::Constant(factor)) => other.scaled(factor),
+            (first, second) => Self::Product(Arc::new([first, second])),
+        }
+    }
+
+    /// Multiplies a texture by a constant.
+    fn scaled(self, factor: DVec3) -> Self {
+        match self {
+            Self::Constant(value) => Self::Constant(value * factor),
+            Self::Image(image) if !image.is_inverted => {
+                Self::Image(ImageNode { factor: image.factor * factor, ..image })
+            }
+            Self::Checker(mapping, parts) => {
+                Self::Checker(mapping, Arc::new(parts.as_ref().clone().map(|part| part.scaled(factor))))
+            }
+            other => Self::Product(Arc::new([other, Self::Constant(factor)])),
+        }
+    }
+
+    /// Interpolates two textures.
+    pub(super) fn mix(first: Self, second: Self, amount: Self) -> Self {
+        match (&first, &second, amount.as_constant()) {
+            (Self::Constant(a), Self::Constant(b), Some(amount)) => Self::Constant(a.lerp(*b, amount.x)),
+            (_, _, Some(amount)) if amount.x == 0.0 => first,
+            (_, _, Some(amount)) if amount.x == 1.0 => second,
+            _ => Self::Mix(Arc::new([first, second, amount])),
+        }
+    }
+}
+
+/// Resolves textures by name.
+pub(super) struct TextureResolver<'a> {
+    pub(super) statements: &'a Statements,
+    pub(super) colors: &'a ColorReader<'a>,
+    /// Textures resolved so far.
+    known: HashMap<(String, TextureValue), TextureNode>,
+}
+
+impl<'a> TextureResolver<'a> {
+    pub(super) fn new(statements: &'a Statements, colors: &'a ColorReader<'a>) -> Self {
+        Self { statements, colors, known: HashMap::new() }
+    }
+
+    /// Reads a parameter that may be a texture. Returns `None` if it is absent.
+    pub(super) fn parameter(
+        &mut self,
+        parameters: &Parameters,
+        name: &'static str,
+        value: TextureValue,
+        space: ColorSpace,
+        notes: &mut NoteCollector,
+    ) -> PbrtResult<Option<TextureNode>> {
+        self.parameter_at_depth(parameters, name, value, space, notes, 0)
+    }
+
+    fn parameter_at_depth(
+        &mut self,
+        parameters: &Parameters,
+        name: &'static str,
+        value: TextureValue,
+        space: ColorSpace,
+        notes: &mut NoteCollector,
+        depth: usize,
+    ) -> PbrtResult<Option<TextureNode>> {
+        let Some(found) = parameters.find(name) else { return Ok(None) };
+        if found.kind == ParameterType::Texture {
+            let text = found.single(found.texts()?)?;
+            return self.named(text, value, notes, depth).map(Some);
+        }
+        match value {
+            TextureValue::Number => {
+                Ok(parameters.optional_float(name)?.map(DVec3::splat).map(TextureNode::Constant))
+            }
+            TextureValue::Color(usage) => {
+                self.colors.color_of(found, space, usage).map(|color| Some(TextureNode::Constant(color)))
+            }
+        }
+    }
+
+    /// Resolves a texture by its name.
+    fn named(
+        &mut self,
+        name: &Text,
+        value: TextureValue,
+        notes: &mut NoteCollector,
+        depth: usize,
+    ) -> PbrtResult<TextureNode> {
+        let key = (name.text.clone(), value);
+        if let Some(known) = self.known.get(&key) {
+            return Ok(known.clone());
+        }
+        if depth > MAX_DEPTH {
+            let message = "this texture uses itself, or too many textures use each other";
+            return Err(PbrtError::new(name.span.clone(), message));
+        }
+        let (textures, kind) = match value {
+            TextureValue::Number => (&self.statements.float_textures, "float"),
+            TextureValue::Color(_) => (&self.statements.spectrum_textures, "spectrum"),
+        };
+        let Some(texture) = textures.get(&name.text) else {
+            let near = nearest_name(&name.text, textures.keys().map(String::as_str));
+            let shown = escape_and_truncate(&name.text, 40);
+            let message = format!("there is no {kind} texture \"{shown}\"");
+            return Err(PbrtError::new(name.span.clone(), message).with_suggestion(near));
+        };
+        let node = self.resolve(texture, value, notes, depth)?;
+        self.known.insert(key, node.clone());
+        Ok(node)
+    }
+
+    fn resolve(
+        &mut self,
+        texture: &PlacedEntity,
+        value: TextureValue,
+        notes: &mut NoteCollector,
+        depth: usize,
+    ) -> PbrtResult<TextureNode> {
+        let entity = &texture.entity;
+        let parameters = &entity.parameters;
+        let mut part = |resolver: &mut Self, name: &'static str, default: f64| {
+            let space = entity.color_space;
+            let found = resolver.parameter_at_depth(parameters, name, value, space, notes, depth + 1)?;
+            PbrtResult::Ok(found.unwrap_or(TextureNode::Constant(DVec3::splat(default))))
+        };
+        let node = match &*entity.kind.text {
+            "constant" => part(self, "value", 1.0)?,
+            "scale" => {
+                let tex = part(self, "tex", 1.0)?;
+                // The scale is always a number.
+                let space = entity.color_space;
+                let number = TextureValue::Number;
+                let scale = self.parameter_at_depth(parameters, "scale", number, space, notes, depth + 1)?;
+                TextureNode::product(tex, scale.unwrap_or(TextureNode::Constant(DVec3::ONE)))
+            }
+            "mix" => {
+                let (first, second) = (part(self, "tex1", 0.0)?, part(self, "tex2", 1.0)?);
+                let (space, number) = (entity.color_space, TextureValue::Number);
+                let amount =
+                    self.parameter_at_depth(parameters, "amount", number, space, notes, depth + 1)?;
+                let amount = amount.unwrap_or(TextureNode::Constant(DVec3::splat(0.5)));
+                TextureNode::mix(first, second, amount)
+            }
+            "directionmix" => {
+                let (first, second) = (part(self, "tex1", 0.0)?, part(self, "tex2", 1.0)?);
+                parameters.ignore(&["dir"]);
+                let text = "the mean of both textures is used";
+                notes.substitute_light("texture `directionmix`", text, entity.span());
+                TextureNode::mix(first, second, TextureNode::Constant(DVec3::splat(0.5)))
+            }
+            "checkerboard" => {
+                let parts = [part(self, "tex1", 1.0)?, part(self, "tex2", 0.0)?];
+                if parameters.integer("dimension", 2, 2..=3)? == 3 {
+                    let text = "its cells follow the texture coordinates instead of space";
+                    notes.substitute("texture `checkerboard` with 3 dimensions", text, entity.span());
+                }
+                TextureNode::Checker(uv_mapping(texture, notes)?, Arc::new(parts))
+            }
+            "dots" => {
+                let (inside, outside) = (part(self, "inside", 1.0)?, part(self, "outside", 0.0)?);
+                notes.substitute("texture `dots`", "their mean is used", entity.span());
+                uv_mapping(texture, notes)?;
+                // A dot of radius 0.35 is in half of the cells.
+                let share = std::f64::consts::PI * 0.35 * 0.35 * 0.5;
+                TextureNode::mix(outside, inside, TextureNode::Constant(DVec3::splat(share)))
+            }
+            "bilerp" => {
+                let corners = [
+                    part(self, "v00", 0.0)?,
+                    part(self, "v01", 1.0)?,
+                    part(self, "v10", 0.0)?,
+                    part(self, "v11", 1.0)?,
+                ];
+                TextureNode::Bilinear(uv_mapping(texture, notes)?, Arc::new(corners))
+            }
+            "imagemap" => TextureNode::Image(image_node(texture, value, notes)?),
+            "fbm" | "wrinkled" | "windy" | "marble" => noise_node(texture, notes)?,
+            "ptex" => {
+                parameters.ignore(&["filename", "encoding", "scale"]);
+                notes.substitute_light("texture `ptex`", "a constant of 0.5 is used", entity.span());
+                TextureNode::Constant(DVec3::splat(0.5))
+            }
+            other => return Err(unknown_texture(other, &entity.kind)),
+        };
+        parameters.check_all_used()?;
+        Ok(node)
+    }
+}
+
+fn unknown_texture(kind: &str, at: &Text) -> Box<PbrtError> {
+    const NAMES: [&str; 13] = [
+        "constant",
+        "scale",
+        "mix",
+        "directionmix",
+        "checkerboard",
+        "dots",
+        "bilerp",
+        "imagemap",
+        "fbm",
+        "wrinkled",
+        "windy",
+        "marble",
+        "ptex",
+    ];
+    let message = format!("unknown texture type \"{}\"", escape_and_truncate(kind, 40));
+    PbrtError::new(at.span.clone(), message).with_suggestion(nearest_name(kind, NAMES))
+}
+
+/// Reads the mapping of a texture. Only (u, v) mappings have an equal.
+fn uv_mapping(texture: &PlacedEntity, notes: &mut NoteCollector) -> PbrtResult<UvMapping> {
+    let parameters = &texture.entity.parameters;
+    let number = |name, default| parameters.float(name, default);
+    let scale = DVec2::new(number("uscale", 1.0)?, number("vscale", 1.0)?);
+    let offset = DVec2::new(number("udelta", 0.0)?, number("vdelta", 0.0)?);
+    let mapping = parameters.string("mapping")?;
+    parameters.ignore(&["v1", "v2"]);
+    match mapping.map(|text| &*text.text) {
+        None | Some("uv") => Ok(UvMapping { scale, offset }),
+        Some(other @ ("spherical" | "cylindrical" | "planar")) => {
+            let subject = format!("texture mapping `{other}`");
+            notes.substitute(
+                &subject,
+                "the texture coordinates of the shape are used",
+                texture.entity.span(),
+            );
+            Ok(UvMapping { scale, offset })
+        }
+        Some(other) => {
+            let near = nearest_name(other, ["uv", "spherical", "cylindrical", "planar"]);
+            let span = parameters.span_of("mapping");
+            Err(PbrtError::new(span, "unknown texture mapping").with_suggestion(near))
+        }
+    }
+}
+
+fn image_node(
+    texture: &PlacedEntity,
+    value: TextureValue,
+    notes: &mut NoteCollector,
+) -> PbrtResult<ImageNode> {
+    let parameters = &texture.entity.parameters;
+    let span = || texture.entity.span();
+    let Some(file) = parameters.string("filename")? else {
+        return Err(PbrtError::new(span(), "this texture has no `filename`"));
+    };
+    let filter = match parameters.string("filter")?.map(|text| &*text.text) {
+        Some("point") => ImageFilter::Nearest,
+        None | Some("bilinear") => ImageFilter::Bilinear,
+        Some("trilinear" | "ewa" | "EWA") => ImageFilter::Mipmap,
+        Some(other) => {
+            let near = nearest_name(other, ["point", "bilinear", "trilinear", "ewa"]);
+            let at = parameters.span_of("filter");
+            return Err(PbrtError::new(at, "unknown texture filter").with_suggestion(near));
+        }
+    };
+    let wrap = match parameters.string("wrap")?.map(|text| &*text.text) {
+        None | Some("repeat") => ImageWrap::Repeat,
+        Some("clamp") => ImageWrap::Clamp,
+        Some("black") => ImageWrap::Black,
+        Some("octahedralsphere") => {
+            notes.substitute("`wrap` \"octahedralsphere\"", "the image repeats", span());
+            ImageWrap::Repeat
+        }
+        Some(other) => {
+            let near = nearest_name(other, ["repeat", "clamp", "black", "octahedralsphere"]);
+            let at = parameters.span_of("wrap");
+            return Err(PbrtError::new(at, "unknown `wrap`").with_suggestion(near));
+        }
+    };
+    // Only PNG files obey the encoding.
+    let is_png = file.text.to_lowercase().ends_with(".png");
+    let is_linear = match parameters.string("encoding")?.map(|text| &*text.text) {
+        None | Some("sRGB" | "srgb") => false,
+        Some("linear") => is_png,
+        Some(_) => {
+            notes.substitute("`encoding` with a gamma", "sRGB is used", span());
+            false
+        }
+    };
+    parameters.ignore(&["maxanisotropy"]);
+    Ok(ImageNode {
+        file: file.clone(),
+        mapping: uv_mapping(texture, notes)?,
+        wrap,
+        filter,
+        is_linear,
+        is_number: value == TextureValue::Number,
+        factor: DVec3::splat(parameters.float("scale", 1.0)?),
+        is_inverted: parameters.bool("invert", false)?,
+    })
+}
+
+/// Substitutes the procedural textures in space.
+fn noise_node(texture: &PlacedEntity, notes: &mut NoteCollector) -> PbrtResult<TextureNode> {
+    let (parameters, kind) = (&texture.entity.parameters, &*texture.entity.kind.text);
+    let octaves = parameters.integer("octaves", 8, 1..=64)?.min(16) as u32;
+    parameters.ignore(&["roughness", "variation"]);
+    let factor = parameters.float("scale", 1.0)?;
+    let subject = format!("texture `{kind}`");
+    let span = texture.entity.span();
+    if kind == "marble" {
+        notes.substitute(&subject, "its mean color is used", span);
+        return Ok(TextureNode::Constant(DVec3::new(0.42, 0.42, 0.45)));
+    }
+    notes.substitute(&subject, "glimt's noise is used, which differs in its pattern", span);
+    Ok(TextureNode::Noise { octaves, factor: if kind == "windy" { 1.0 } else { factor } })
+}

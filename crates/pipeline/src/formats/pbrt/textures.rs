@@ -1,0 +1,199 @@
+//! Adds the `[textures]` tables.
+
+use std::sync::Arc;
+
+use super::scene::SceneWriter;
+use super::texture_nodes::{ImageFilter, ImageNode, ImageWrap, TextureNode, UvMapping};
+use crate::formats::rounding::shorten_color;
+use crate::math::DVec3;
+use crate::scene::BuiltValue;
+
+/// Keys and values of a table.
+pub(super) type Entries = Vec<(&'static str, BuiltValue)>;
+
+/// The values of a texture that are used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum TextureUse {
+    Color,
+    Number,
+    /// Heights, whose factor is a separate key.
+    Height,
+    Normal,
+}
+
+impl SceneWriter<'_> {
+    /// Returns the value of a color key: a color or a reference to a texture.
+    pub(super) fn color_value(&mut self, node: &TextureNode) -> BuiltValue {
+        let node = &self.without_missing_images(node);
+        if let Some(color) = node.as_constant() {
+            return shorten_color(color);
+        }
+        texture_value(self.texture(node, TextureUse::Color))
+    }
+
+    /// Returns the value of a number key.
+    pub(super) fn number_value(&mut self, node: &TextureNode) -> BuiltValue {
+        let node = &self.without_missing_images(node);
+        if let Some(number) = node.as_constant() {
+            return number.x.into();
+        }
+        let name = self.texture(node, TextureUse::Number);
+        BuiltValue::Table(vec![("texture", name.into()), ("channel", "r".into())])
+    }
+
+    /// Replaces missing images with gray if they are tolerated.
+    pub(super) fn without_missing_images(&mut self, node: &TextureNode) -> TextureNode {
+        if let TextureNode::Image(image) = node
+            && self.is_tolerated_missing(&image.file, "image", "gray is used")
+        {
+            return TextureNode::Constant(DVec3::splat(0.5));
+        }
+        let mut of = |part: &TextureNode| self.without_missing_images(part);
+        match node {
+            TextureNode::Constant(_) | TextureNode::Image(_) | TextureNode::Noise { .. } => node.clone(),
+            TextureNode::Checker(mapping, parts) => {
+                TextureNode::Checker(*mapping, Arc::new(parts.each_ref().map(&mut of)))
+            }
+            TextureNode::Product(parts) => {
+                let [first, second] = parts.each_ref().map(&mut of);
+                TextureNode::product(first, second)
+            }
+            TextureNode::Mix(parts) => {
+                let [first, second, amount] = parts.each_ref().map(&mut of);
+                TextureNode::mix(first, second, amount)
+            }
+            TextureNode::Bilinear(mapping, parts) => {
+                TextureNode::Bilinear(*mapping, Arc::new(parts.each_ref().map(&mut of)))
+            }
+            TextureNode::Power(part, exponent) => match of(part) {
+                TextureNode::Constant(value) => {
+                    TextureNode::Constant(DVec3::splat(libm::pow(value.x.max(0.0), *exponent)))
+                }
+                part => TextureNode::Power(Arc::new(part), *exponent),
+            },
+        }
+    }
+
+    /// Returns the name of the texture's table. Adds the table if it is new.
+    pub(super) fn texture(&mut self, node: &TextureNode, usage: TextureUse) -> String {
+        let (keys, name) = match node {
+            TextureNode::Image(image) if self.is_plain_image(image, usage) => {
+                (self.image_keys(image, usage), file_stem(&image.file.text))
+            }
+            TextureNode::Checker(mapping, parts) => match (parts[0].as_constant(), parts[1].as_constant()) {
+                (Some(first), Some(second)) => {
+                    (checker_keys(*mapping, [first, second]), "checker".to_owned())
+                }
+                _ => self.baked_keys(node, usage),
+            },
+            TextureNode::Noise { octaves, factor } => (noise_keys(*octaves, *factor), "noise".to_owned()),
+            TextureNode::Constant(_)
+            | TextureNode::Image(_)
+            | TextureNode::Product(_)
+            | TextureNode::Mix(_)
+            | TextureNode::Power(..)
+            | TextureNode::Bilinear(..) => self.baked_keys(node, usage),
+        };
+        self.add_texture_table(keys, &name)
+    }
+
+    /// Adds a table unless an equal one exists, and returns its name.
+    pub(super) fn add_texture_table(&mut self, keys: Entries, wanted: &str) -> String {
+        let identity = format!("{keys:?}");
+        if let Some(known) = self.textures.get(&identity) {
+            return known.clone();
+        }
+        let name = self.texture_names.make_unique(wanted, "texture");
+        self.document.start_named_table("textures", &name);
+        keys.into_iter().for_each(|(key, value)| self.document.set(key, value));
+        self.textures.insert(identity, name.clone());
+        name
+    }
+
+    /// Whether glimt reads the image as it is.
+    fn is_plain_image(&mut self, image: &ImageNode, usage: TextureUse) -> bool {
+        if image.wrap == ImageWrap::Black || image.mapping.scale.min_element() == 0.0 {
+            return false;
+        }
+        if image.factor.min_element() < 0.0 && usage != TextureUse::Height {
+            return false;
+        }
+        match usage {
+            TextureUse::Color => !image.is_inverted,
+            TextureUse::Number => !image.is_inverted && self.is_gray_image(image),
+            TextureUse::Height => self.is_gray_image(image),
+            TextureUse::Normal => true,
+        }
+    }
+
+    fn image_keys(&mut self, image: &ImageNode, usage: TextureUse) -> Entries {
+        let mut keys: Entries = vec![("file", self.asset_name(&image.file).into())];
+        match image.wrap {
+            ImageWrap::Repeat | ImageWrap::Black => {}
+            ImageWrap::Clamp => keys.push(("wrap", "clamp".into())),
+        }
+        match image.filter {
+            ImageFilter::Nearest => keys.push(("filter", "nearest".into())),
+            ImageFilter::Bilinear => {}
+            ImageFilter::Mipmap => keys.push(("filter", "mipmap".into())),
+        }
+        let is_integer = !has_float_extension(&image.file.text);
+        match usage {
+            TextureUse::Normal => {}
+            TextureUse::Color | TextureUse::Number | TextureUse::Height if image.is_linear => {
+                keys.push(("encoding", "linear".into()));
+            }
+            // Numbers are decoded like colors.
+            TextureUse::Number | TextureUse::Height if is_integer => keys.push(("encoding", "srgb".into())),
+            TextureUse::Color | TextureUse::Number | TextureUse::Height => {}
+        }
+        push_mapping(&mut keys, image.mapping, 1.0);
+        if usage == TextureUse::Color && image.factor != DVec3::ONE {
+            keys.push(("factor", shorten_color(image.factor)));
+        } else if usage == TextureUse::Number && image.factor.x != 1.0 {
+            keys.push(("factor", image.factor.x.into()));
+        }
+        keys
+    }
+}
+
+/// Refers to a texture.
+pub(super) fn texture_value(name: String) -> BuiltValue {
+    BuiltValue::Table(vec![("texture", name.into())])
+}
+
+/// Whether a file's texels are linear floats.
+pub(super) fn has_float_extension(file: &str) -> bool {
+    let file = file.to_lowercase();
+    [".exr", ".hdr", ".pfm"].iter().any(|extension| file.ends_with(extension))
+}
+
+fn file_stem(file: &str) -> String {
+    std::path::Path::new(file).file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default()
+}
+
+/// Adds `repeat` and `offset`. `cells` is the number of pbrt's units per repetition.
+pub(super) fn push_mapping(keys: &mut Entries, mapping: UvMapping, cells: f64) {
+    let UvMapping { scale, offset } = mapping;
+    if scale / cells != crate::math::DVec2::ONE {
+        keys.push(("repeat", (scale / cells).to_array().into()));
+    }
+    if offset != crate::math::DVec2::ZERO {
+        keys.push(("offset", (offset / cells).to_array().into()));
+    }
+}
+
+/// glimt's checkers have two cells per repetition.
+fn checker_keys(mapping: UvMapping, colors: [DVec3; 2]) -> Entries {
+    let colors = colors.map(|color| color.max(DVec3::ZERO)).map(shorten_color).to_vec();
+    let mut keys: Entries =
+        vec![("type", "checker".into()), ("colors", BuiltValue::Array(colors)), ("filter", "mipmap".into())];
+    push_mapping(&mut keys, mapping, 2.0);
+    keys
+}
+
+/// Noise from 0 to `factor`.
+fn noise_keys(octaves: u32, factor: f64) -> Entries {
+    let colors = BuiltValue::Array(vec![0.0.into(), factor.abs().into()]);
+    vec![("type", "noise".into()), ("colors", colors), ("octaves", f64::from(octaves).into())]
+}
