@@ -15,10 +15,10 @@ use glimt::materials::texels::{TexelData, Texels};
 use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::light::{Falloff, PointLight};
 use glimt::scene::description::{
-    Accel, AffineMap, Camera, CoatSource, ColorSource, EmissionSource, Environment, FresnelSource,
-    ImageSource, ImageWindow, Integrator, Light, MapOrientation, MapRows, Material, MaterialKind, MeshFile,
-    MeshReference, MicrofacetDistribution, NumberSource, Object, ObjectTransform, OpacitySource, Pattern,
-    PhongParameters, PhotonOptions, PixelFilter, Projection, ReflectingSides, RenderOptions, Scene,
+    Accel, AffineMap, Camera, CoatSource, ColorSource, ConductorFresnelSource, EmissionSource, Environment,
+    ImageShiftAndMirror, ImageSource, Integrator, Light, MapOrientation, MapRows, Material, MaterialKind,
+    MeshFile, MeshReference, MicrofacetDistribution, NumberSource, Object, ObjectTransform, OpacitySource,
+    Pattern, PhongParameters, PhotonOptions, PixelFilter, Projection, ReflectingSides, RenderOptions, Scene,
     ShadowMode, Shape, Sky, Spanned, Texture, TextureContent, TextureEncoding, TextureFilter, Tonemap, UvSet,
     Wrap,
 };

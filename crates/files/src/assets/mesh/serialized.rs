@@ -303,7 +303,7 @@ mod tests {
     fn triangle(version: u16, x: f32) -> Vec<u8> {
         let mut data: Vec<u8> = Vec::new();
         let floats = |data: &mut Vec<u8>, values: &[f32]| {
-            values.iter().for_each(|value| data.extend(value.to_le_bytes()))
+            values.iter().for_each(|value| data.extend(value.to_le_bytes()));
         };
         if version == 5 {
             data.extend((0x1000_u32 | HAS_COORDINATES_5).to_le_bytes());

@@ -11,8 +11,6 @@ const INTEGRATION_STEP: f64 = 0.5;
 pub(crate) struct SampledSpectrum {
     /// Wavelengths in nanometers, and values.
     points: Vec<[f64; 2]>,
-    /// Whether the spectrum keeps its first and last value outside of its range. Otherwise it is 0 there.
-    holds_ends: bool,
 }
 
 impl SampledSpectrum {
@@ -30,12 +28,7 @@ impl SampledSpectrum {
         if let Some(two) = points.windows(2).find(|two| two[1][0] <= two[0][0]) {
             return Err(format!("wavelengths must increase: {} follows {}", two[1][0], two[0][0]));
         }
-        Ok(Self { points, holds_ends: false })
-    }
-
-    /// Keeps the first and last value outside of the range.
-    pub(crate) fn holding_ends(self) -> Self {
-        Self { holds_ends: true, ..self }
+        Ok(Self { points })
     }
 
     /// Parses the lines of an `.spd` file: a wavelength and a value each, and comments after `#`.
@@ -67,8 +60,7 @@ impl SampledSpectrum {
         let after = self.points.partition_point(|point| point[0] <= wavelength);
         match (after.checked_sub(1).map(|index| self.points[index]), self.points.get(after)) {
             (Some([x0, y0]), Some(&[x1, y1])) => y0 + (y1 - y0) * (wavelength - x0) / (x1 - x0),
-            (Some([x0, y0]), None) if self.holds_ends || wavelength == x0 => y0,
-            (None, Some(&[_, y1])) if self.holds_ends => y1,
+            (Some([x0, y0]), None) if wavelength == x0 => y0,
             (Some(_) | None, _) => 0.0,
         }
     }
@@ -169,11 +161,10 @@ mod tests {
     }
 
     #[test]
-    fn spectra_end_at_zero_or_hold_their_ends() {
+    fn spectra_are_zero_outside_their_range() {
         let spectrum = SampledSpectrum::new(vec![[500.0, 2.0], [600.0, 4.0]]).expect("a spectrum");
         let at = |spectrum: &SampledSpectrum| [499.0, 500.0, 550.0, 600.0, 601.0].map(|nm| spectrum.at(nm));
         assert_eq!(at(&spectrum), [0.0, 2.0, 3.0, 4.0, 0.0]);
-        assert_eq!(at(&spectrum.holding_ends()), [2.0, 2.0, 3.0, 4.0, 4.0]);
     }
 
     #[test]

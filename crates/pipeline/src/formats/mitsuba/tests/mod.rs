@@ -52,7 +52,7 @@ impl Bench {
     }
 
     fn read(&self) -> Result<ForeignScene, Vec<Diagnostic>> {
-        self.with_context(|path, context| read(path, context)).map_err(diagnostics)
+        self.with_context(read).map_err(diagnostics)
     }
 
     fn import(&self) -> ImportedScene {
