@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::graph::{Child, Object, ObjectKind};
+use super::graph::{Child, ObjectKind, PluginInstance};
 use super::property::{PropertyValue, SpectrumValue};
 use super::reader::{ColorRole, ColorSource, NumberSource, SceneReader, luminance};
 use crate::assets::Companion;
@@ -16,7 +16,7 @@ impl<'a> SceneReader<'a> {
     /// Returns a color or texture. `default` is a gray.
     pub(super) fn color(
         &mut self,
-        object: &'a Object,
+        object: &'a PluginInstance,
         name: &str,
         role: ColorRole,
         default: f64,
@@ -58,7 +58,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Returns the color of a texture with a single value.
-    fn constant_texture_color(&mut self, object: &'a Object) -> DVec3 {
+    fn constant_texture_color(&mut self, object: &'a PluginInstance) -> DVec3 {
         let name = if object.property("color").is_some() { "color" } else { "value" };
         match object.property(name).map(|property| &property.value) {
             Some(PropertyValue::Vector(vector)) => *vector,
@@ -70,7 +70,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Returns the color of a `<spectrum type="…">`.
-    pub(super) fn spectrum_plugin_color(&mut self, object: &'a Object, role: ColorRole) -> DVec3 {
+    pub(super) fn spectrum_plugin_color(&mut self, object: &'a PluginInstance, role: ColorRole) -> DVec3 {
         let constant = |source: ColorSource| match source {
             ColorSource::Constant(color) => color,
             ColorSource::Texture(_) => DVec3::splat(0.5),
@@ -109,7 +109,7 @@ impl<'a> SceneReader<'a> {
         }
     }
 
-    fn tabulated_spectrum(&mut self, object: &'a Object, role: ColorRole) -> DVec3 {
+    fn tabulated_spectrum(&mut self, object: &'a PluginInstance, role: ColorRole) -> DVec3 {
         let numbers = |text: Option<(&str, Range<usize>)>| -> Vec<f64> {
             let words = text.map_or("", |(text, _)| text).split(|c: char| c.is_whitespace() || c == ',');
             words.filter_map(|word| word.parse().ok()).collect()
@@ -182,7 +182,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Returns a number or texture.
-    pub(super) fn number(&mut self, object: &'a Object, name: &str, default: f64) -> NumberSource {
+    pub(super) fn number(&mut self, object: &'a PluginInstance, name: &str, default: f64) -> NumberSource {
         if let Some(child) = object.named_child(name) {
             return match self.color_of_child(child, ColorRole::Reflectance) {
                 ColorSource::Constant(color) => NumberSource::Constant(luminance(color)),

@@ -2,8 +2,8 @@
 
 use std::f64::consts::PI;
 
-use super::graph::Object;
-use super::reader::{ColorRole, ColorSource, Entries, SceneReader};
+use super::graph::PluginInstance;
+use super::reader::{ColorRole, ColorSource, MitsubaEntries, SceneReader};
 use super::settings::span_of;
 use super::textures::extension;
 use super::xml::shorten;
@@ -58,7 +58,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Returns a constant color of light, and reports textures.
-    fn light_color(&mut self, object: &'a Object, name: &str) -> DVec3 {
+    fn light_color(&mut self, object: &'a PluginInstance, name: &str) -> DVec3 {
         match self.color(object, name, ColorRole::Emission, 1.0) {
             ColorSource::Constant(color) => color,
             ColorSource::Texture(_) => {
@@ -69,7 +69,7 @@ impl<'a> SceneReader<'a> {
         }
     }
 
-    fn add_point_light(&mut self, object: &'a Object) {
+    fn add_point_light(&mut self, object: &'a PluginInstance) {
         let intensity = self.light_color(object, "intensity");
         let position = match self.vector(object, "position") {
             Some(position) => position,
@@ -81,13 +81,13 @@ impl<'a> SceneReader<'a> {
         self.document.set("intensity", shorten_color(intensity));
     }
 
-    fn set_light_name(&mut self, object: &'a Object) {
+    fn set_light_name(&mut self, object: &'a PluginInstance) {
         if let Some(id) = &object.id {
             self.document.add_table_comment(shorten(id));
         }
     }
 
-    fn add_spot_light(&mut self, object: &'a Object) {
+    fn add_spot_light(&mut self, object: &'a PluginInstance) {
         let intensity = self.light_color(object, "intensity");
         if object.named_child("texture").is_some() {
             self.notes.substitute_light(
@@ -119,7 +119,7 @@ impl<'a> SceneReader<'a> {
         self.document.set("blend", shorten_number(((cutoff - beam) / cutoff).clamp(0.0, 1.0)));
     }
 
-    fn add_directional_light(&mut self, object: &'a Object) {
+    fn add_directional_light(&mut self, object: &'a PluginInstance) {
         let irradiance = self.light_color(object, "irradiance");
         let direction = match self.vector(object, "direction") {
             Some(direction) => direction,
@@ -136,7 +136,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Starts the `[environment]` table. Returns false if there is one already.
-    fn start_environment(&mut self, object: &'a Object) -> bool {
+    fn start_environment(&mut self, object: &'a PluginInstance) -> bool {
         if std::mem::replace(&mut self.has_environment, true) {
             let help = "remove one of them".to_owned();
             self.error(object.span.clone(), "the scene has two environments", Some(help));
@@ -146,14 +146,14 @@ impl<'a> SceneReader<'a> {
         true
     }
 
-    fn add_constant_environment(&mut self, object: &'a Object) {
+    fn add_constant_environment(&mut self, object: &'a PluginInstance) {
         let radiance = self.light_color(object, "radiance");
         if self.start_environment(object) {
             self.document.set("color", shorten_color(radiance));
         }
     }
 
-    fn add_environment_map(&mut self, object: &'a Object) {
+    fn add_environment_map(&mut self, object: &'a PluginInstance) {
         let Some((name, span)) = self.text(object, "filename") else {
             return self.error(object.span.clone(), "the environment map needs `filename`", None);
         };
@@ -193,7 +193,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Adds the rotation of the environment, unless it is the identity.
-    fn set_environment_matrix(&mut self, object: &'a Object, matrix: DMat3) {
+    fn set_environment_matrix(&mut self, object: &'a PluginInstance, matrix: DMat3) {
         let axes = [matrix.x_axis, matrix.y_axis, matrix.z_axis].map(DVec3::try_normalize);
         let [Some(x), Some(y), Some(z)] = axes else {
             return self.error(object.span.clone(), "the environment's `to_world` is degenerate", None);
@@ -216,7 +216,7 @@ impl<'a> SceneReader<'a> {
         }
     }
 
-    fn add_sky(&mut self, object: &'a Object) {
+    fn add_sky(&mut self, object: &'a PluginInstance) {
         let turbidity = self.float(object, "turbidity").unwrap_or(3.0);
         let scale = self.float(object, "scale").unwrap_or(1.0);
         let mut sun_scale = self.float(object, "sun_scale").unwrap_or(1.0) * scale;
@@ -275,7 +275,7 @@ impl<'a> SceneReader<'a> {
         if !(1.0..=10.0).contains(&turbidity) {
             return self.error(span_of(object, "turbidity"), "`turbidity` must be between 1 and 10", None);
         }
-        let mut sky: Entries = vec![
+        let mut sky: MitsubaEntries = vec![
             ("sun", local.into()),
             ("turbidity", shorten_number(turbidity).into()),
             ("ground", shorten_color(ground)),
@@ -299,7 +299,7 @@ impl<'a> SceneReader<'a> {
     /// Direction toward the sun at a time and place, with z up and x to the south in Mitsuba 3, or y up and x
     /// to the east in version 0.6. Uses the algorithm of Blanco-Muriel et al., Computing the Solar Vector,
     /// Solar Energy 70(5), 2001.
-    fn sun_direction(&mut self, object: &'a Object) -> DVec3 {
+    fn sun_direction(&mut self, object: &'a PluginInstance) -> DVec3 {
         let mut number = |name: &str, default: f64| self.float(object, name).unwrap_or(default);
         let (latitude, longitude) = (number("latitude", 35.6894), number("longitude", 139.6917));
         let timezone = number("timezone", 9.0);

@@ -77,7 +77,7 @@ const VALUE_TAGS: [&str; 16] = [
 
 /// A plugin instance.
 #[derive(Debug)]
-pub(super) struct Object {
+pub(super) struct PluginInstance {
     pub(super) kind: ObjectKind,
     /// The plugin's name in lowercase.
     pub(super) plugin: String,
@@ -107,7 +107,7 @@ pub(super) struct Child {
     pub(super) span: Range<usize>,
 }
 
-impl Object {
+impl PluginInstance {
     /// Returns a property and marks it as used.
     pub(super) fn property(&self, name: &str) -> Option<&Property> {
         let found = self.properties.iter().find(|one| one.name == name)?;
@@ -124,7 +124,7 @@ impl Object {
 /// All objects of a scene.
 #[derive(Debug, Default)]
 pub(super) struct SceneGraph {
-    pub(super) objects: Vec<Object>,
+    pub(super) objects: Vec<PluginInstance>,
 }
 
 /// Builds the graph from the elements of a scene.
@@ -188,7 +188,7 @@ impl<'a> GraphBuilder<'a> {
             let span = element.attribute("id").map_or(element.span.clone(), |one| one.span.clone());
             self.error(span, format!("the id `{}` is used twice", shorten(id)), None);
         }
-        self.graph.objects.push(Object {
+        self.graph.objects.push(PluginInstance {
             kind,
             plugin: name.to_ascii_lowercase(),
             id,

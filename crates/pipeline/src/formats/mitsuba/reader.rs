@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use super::graph::{Child, Object, ObjectIndex, ObjectKind, SceneGraph};
+use super::graph::{Child, ObjectIndex, ObjectKind, PluginInstance, SceneGraph};
 use super::material_key::MaterialKey;
 use super::plastic::PlasticCoat;
 use super::property::{PropertyValue, SpectrumValue, TransformValue};
@@ -22,7 +22,7 @@ use crate::scene::{BuiltValue, SceneDocumentBuilder, SourceFiles};
 use crate::stages::containers::GltfContainers;
 
 /// Keys and values of a table.
-pub(super) type Entries = Vec<(&'static str, BuiltValue)>;
+pub(super) type MitsubaEntries = Vec<(&'static str, BuiltValue)>;
 
 /// What a color is used for, which determines how spectra are converted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -130,7 +130,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Returns an object. The result does not borrow the reader.
-    pub(super) fn object(&self, index: ObjectIndex) -> &'a Object {
+    pub(super) fn object(&self, index: ObjectIndex) -> &'a PluginInstance {
         &self.graph.objects[index]
     }
 
@@ -142,14 +142,14 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Reports a feature that glimt lacks and cannot replace.
-    pub(super) fn refuse(&mut self, object: &Object, what: &str) {
+    pub(super) fn refuse(&mut self, object: &PluginInstance, what: &str) {
         let message = format!("glimt does not render {what} (`{}`)", shorten(&object.plugin));
         let help = "remove it, or render this scene with Mitsuba".to_owned();
         self.error(object.span.clone(), message, Some(help));
     }
 
     /// Reports a plugin that neither Mitsuba nor glimt knows.
-    pub(super) fn unknown_plugin(&mut self, object: &Object, kind: &str, known: &[&str]) {
+    pub(super) fn unknown_plugin(&mut self, object: &PluginInstance, kind: &str, known: &[&str]) {
         let near = nearest_name(&object.plugin, known.iter().copied());
         let help = match near {
             Some(near) => format!("did you mean `{near}`?"),
@@ -170,7 +170,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Returns a number.
-    pub(super) fn float(&mut self, object: &Object, name: &str) -> Option<f64> {
+    pub(super) fn float(&mut self, object: &PluginInstance, name: &str) -> Option<f64> {
         let property = object.property(name)?;
         match &property.value {
             PropertyValue::Float(number) => Some(*number),
@@ -184,7 +184,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Returns an integer.
-    pub(super) fn integer(&mut self, object: &Object, name: &str) -> Option<i64> {
+    pub(super) fn integer(&mut self, object: &PluginInstance, name: &str) -> Option<i64> {
         let property = object.property(name)?;
         match &property.value {
             PropertyValue::Integer(number) => Some(*number),
@@ -197,7 +197,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Returns a boolean.
-    pub(super) fn boolean(&mut self, object: &Object, name: &str, default: bool) -> bool {
+    pub(super) fn boolean(&mut self, object: &PluginInstance, name: &str, default: bool) -> bool {
         let Some(property) = object.property(name) else { return default };
         match &property.value {
             PropertyValue::Boolean(flag) => *flag,
@@ -209,7 +209,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Returns a string and its span.
-    pub(super) fn text(&mut self, object: &'a Object, name: &str) -> Option<(&'a str, Range<usize>)> {
+    pub(super) fn text(&mut self, object: &'a PluginInstance, name: &str) -> Option<(&'a str, Range<usize>)> {
         let property = object.property(name)?;
         match &property.value {
             PropertyValue::Text(text) => Some((text, property.span.clone())),
@@ -221,7 +221,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Returns a vector.
-    pub(super) fn vector(&mut self, object: &Object, name: &str) -> Option<DVec3> {
+    pub(super) fn vector(&mut self, object: &PluginInstance, name: &str) -> Option<DVec3> {
         let property = object.property(name)?;
         match &property.value {
             PropertyValue::Vector(vector) => Some(*vector),
@@ -233,7 +233,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Returns a transform.
-    pub(super) fn transform_value(&mut self, object: &Object, name: &str) -> Option<TransformValue> {
+    pub(super) fn transform_value(&mut self, object: &PluginInstance, name: &str) -> Option<TransformValue> {
         let property = object.property(name)?;
         match &property.value {
             PropertyValue::Transform(transform) => Some(*transform),
@@ -245,14 +245,14 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Returns the matrix of `to_world`, or the identity.
-    pub(super) fn world_matrix(&mut self, object: &Object) -> DMat4 {
+    pub(super) fn world_matrix(&mut self, object: &PluginInstance) -> DMat4 {
         self.transform_value(object, "to_world").map_or(DMat4::IDENTITY, |transform| transform.matrix)
     }
 
     /// Returns the nested objects of a kind.
     pub(super) fn children_of_kind(
         &self,
-        object: &'a Object,
+        object: &'a PluginInstance,
         kind: ObjectKind,
     ) -> impl Iterator<Item = &'a Child> + use<'a> {
         let graph = self.graph;
@@ -260,7 +260,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Adds the entries to the current table.
-    pub(super) fn set_all(&mut self, entries: Entries) {
+    pub(super) fn set_all(&mut self, entries: MitsubaEntries) {
         for (key, value) in entries {
             self.document.set(key, value);
         }

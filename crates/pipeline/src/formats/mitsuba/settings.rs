@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::graph::{Child, Object, ObjectKind};
+use super::graph::{Child, ObjectKind, PluginInstance};
 use super::reader::SceneReader;
 use super::xml::shorten;
 use crate::formats::foreign::transform::{is_mirroring, linear_part};
@@ -79,7 +79,7 @@ impl FilmWindow {
 
 impl<'a> SceneReader<'a> {
     /// Adds the `[render]` and `[camera]` tables.
-    pub(super) fn add_settings(&mut self, scene: &'a Object) {
+    pub(super) fn add_settings(&mut self, scene: &'a PluginInstance) {
         let Some(sensor) = self.select_sensor(scene) else { return };
         let sensor = self.object(sensor.target);
         let film = self.children_of_kind(sensor, ObjectKind::Film).next().map(|child| child.target);
@@ -99,7 +99,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Returns the sensor to use.
-    fn select_sensor(&mut self, scene: &'a Object) -> Option<&'a Child> {
+    fn select_sensor(&mut self, scene: &'a PluginInstance) -> Option<&'a Child> {
         let sensors: Vec<&Child> = self.children_of_kind(scene, ObjectKind::Sensor).collect();
         if sensors.is_empty() {
             let help = "add a <sensor>, or open the file that includes this one".to_owned();
@@ -130,7 +130,7 @@ impl<'a> SceneReader<'a> {
         found
     }
 
-    fn film_window(&mut self, film: Option<&'a Object>) -> FilmWindow {
+    fn film_window(&mut self, film: Option<&'a PluginInstance>) -> FilmWindow {
         let [default_width, default_height] = DEFAULT_FILM_SIZE;
         let full = |width: i64, height: i64| FilmWindow {
             size: [width as f64, height as f64],
@@ -187,7 +187,7 @@ impl<'a> SceneReader<'a> {
         }
     }
 
-    fn add_filter(&mut self, film: Option<&'a Object>) {
+    fn add_filter(&mut self, film: Option<&'a PluginInstance>) {
         let filter = film.and_then(|film| self.children_of_kind(film, ObjectKind::Filter).next());
         let Some(filter) = filter.map(|child| self.object(child.target)) else {
             self.document.set("filter", "gaussian");
@@ -237,7 +237,7 @@ impl<'a> SceneReader<'a> {
         self.document.set("filter", name);
     }
 
-    fn add_integrator(&mut self, scene: &'a Object) {
+    fn add_integrator(&mut self, scene: &'a PluginInstance) {
         let mut integrator = self.children_of_kind(scene, ObjectKind::Integrator).next();
         let mut nested = 0;
         // Integrators that add channels contain the integrator of the light.
@@ -314,7 +314,7 @@ impl<'a> SceneReader<'a> {
         }
     }
 
-    fn add_camera(&mut self, sensor: &'a Object, window: &FilmWindow) {
+    fn add_camera(&mut self, sensor: &'a PluginInstance, window: &FilmWindow) {
         self.document.set_span_for_next_values(sensor.span.clone());
         let transform = self.transform_value(sensor, "to_world");
         let matrix = transform.map_or(DMat4::IDENTITY, |transform| transform.matrix);
@@ -397,7 +397,7 @@ impl<'a> SceneReader<'a> {
         }
     }
 
-    fn add_lens(&mut self, sensor: &'a Object, scale: f64, depth: f64) {
+    fn add_lens(&mut self, sensor: &'a PluginInstance, scale: f64, depth: f64) {
         let radius = self.float(sensor, "aperture_radius").unwrap_or(0.0) * scale;
         if radius <= 0.0 {
             return;
@@ -414,7 +414,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Tangent of half the vertical field of view of the whole film.
-    fn half_height_of_perspective(&mut self, sensor: &'a Object, window: &FilmWindow) -> f64 {
+    fn half_height_of_perspective(&mut self, sensor: &'a PluginInstance, window: &FilmWindow) -> f64 {
         let aspect = window.aspect();
         let (angle, axis, span) = match self.float(sensor, "fov") {
             Some(fov) => {
@@ -450,7 +450,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Focal length in millimeters, 50 by default.
-    fn focal_length(&mut self, sensor: &'a Object) -> f64 {
+    fn focal_length(&mut self, sensor: &'a PluginInstance) -> f64 {
         const DEFAULT: f64 = 50.0;
         let Some((text, span)) = self.text(sensor, "focal_length") else { return DEFAULT };
         let number = text.trim().trim_end_matches("mm").trim().parse::<f64>().ok();
@@ -462,6 +462,6 @@ impl<'a> SceneReader<'a> {
 }
 
 /// Span of a property, or of the object if it has no such property.
-pub(super) fn span_of(object: &Object, name: &str) -> Range<usize> {
+pub(super) fn span_of(object: &PluginInstance, name: &str) -> Range<usize> {
     object.property(name).map_or(object.span.clone(), |property| property.span.clone())
 }

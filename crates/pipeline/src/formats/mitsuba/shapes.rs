@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::graph::{Child, Object, ObjectIndex, ObjectKind};
+use super::graph::{Child, ObjectIndex, ObjectKind, PluginInstance};
 use super::material_key::UvConvention;
 use super::placement::{cylinder_matrix, has_normals};
 use super::reader::SceneReader;
@@ -106,7 +106,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Adds all nested shapes of an object. Returns whether anything was added.
-    fn add_shapes_of(&mut self, object: &'a Object, target: ShapeTarget<'_>) -> bool {
+    fn add_shapes_of(&mut self, object: &'a PluginInstance, target: ShapeTarget<'_>) -> bool {
         let mut is_added = false;
         for child in self.children_of_kind(object, ObjectKind::Shape) {
             is_added |= self.add_shape(child.target, target);
@@ -115,7 +115,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Returns the name of a shape's material. Returns `None` if the shape is invisible or has errors.
-    fn shape_material(&mut self, object: &'a Object, uv: UvConvention) -> Option<String> {
+    fn shape_material(&mut self, object: &'a PluginInstance, uv: UvConvention) -> Option<String> {
         let bsdf: Option<&'a Child> = self.children_of_kind(object, ObjectKind::Bsdf).next();
         if let Some(second) = self.children_of_kind(object, ObjectKind::Bsdf).nth(1) {
             let text = "only the first is used";
@@ -140,7 +140,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Reports flipped normals, which glimt ignores. In Mitsuba, mirroring transforms flip normals, too.
-    fn note_flipped_normals(&mut self, object: &'a Object) {
+    fn note_flipped_normals(&mut self, object: &'a PluginInstance) {
         let text = "the front is the usual side, which matters to one-sided materials, glass and lights";
         self.notes.substitute_light(
             "normals flipped by `flip_normals` or a mirroring `to_world`",
@@ -150,7 +150,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Returns the transform of a shape, or reports an error and returns `None`.
-    fn shape_transform(&mut self, object: &'a Object) -> Option<DMat4> {
+    fn shape_transform(&mut self, object: &'a PluginInstance) -> Option<DMat4> {
         let matrix = self.world_matrix(object);
         if !is_invertible_affine(&matrix) {
             let text = "left out";
@@ -163,7 +163,7 @@ impl<'a> SceneReader<'a> {
     /// Starts the table of a shape.
     fn start_shape(
         &mut self,
-        object: &'a Object,
+        object: &'a PluginInstance,
         target: ShapeTarget<'_>,
         list: &'static str,
         material: String,
@@ -186,7 +186,7 @@ impl<'a> SceneReader<'a> {
         }
     }
 
-    fn add_mesh(&mut self, object: &'a Object, target: ShapeTarget<'_>) -> bool {
+    fn add_mesh(&mut self, object: &'a PluginInstance, target: ShapeTarget<'_>) -> bool {
         let Some(matrix) = self.shape_transform(object) else { return false };
         let Some((name, span)) = self.text(object, "filename") else {
             self.error(object.span.clone(), "the mesh needs `filename`", None);
@@ -239,7 +239,7 @@ impl<'a> SceneReader<'a> {
         matches!(loaded, Err(AssetError::Malformed { reason, .. }) if reason.starts_with(NO_USABLE_FACE))
     }
 
-    fn add_sphere(&mut self, object: &'a Object, target: ShapeTarget<'_>) -> bool {
+    fn add_sphere(&mut self, object: &'a PluginInstance, target: ShapeTarget<'_>) -> bool {
         let Some(matrix) = self.shape_transform(object) else { return false };
         let center = self.vector(object, "center").unwrap_or(DVec3::ZERO);
         let radius = self.float(object, "radius").unwrap_or(1.0);
@@ -275,7 +275,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Whether the material of a shape depends on its texture coordinates or tangents.
-    fn shape_uses_coordinates(&self, object: &'a Object) -> bool {
+    fn shape_uses_coordinates(&self, object: &'a PluginInstance) -> bool {
         let mut pending: Vec<ObjectIndex> = object.children.iter().map(|child| child.target).collect();
         while let Some(index) = pending.pop() {
             let inner = self.object(index);
@@ -290,7 +290,7 @@ impl<'a> SceneReader<'a> {
         false
     }
 
-    fn add_cylinder(&mut self, object: &'a Object, target: ShapeTarget<'_>) -> bool {
+    fn add_cylinder(&mut self, object: &'a PluginInstance, target: ShapeTarget<'_>) -> bool {
         let Some(matrix) = self.shape_transform(object) else { return false };
         let start = self.vector(object, "p0").unwrap_or(DVec3::ZERO);
         let end = self.vector(object, "p1").unwrap_or(DVec3::Z);
@@ -334,7 +334,7 @@ impl<'a> SceneReader<'a> {
         true
     }
 
-    fn add_disk(&mut self, object: &'a Object, target: ShapeTarget<'_>) -> bool {
+    fn add_disk(&mut self, object: &'a PluginInstance, target: ShapeTarget<'_>) -> bool {
         let Some(matrix) = self.shape_transform(object) else { return false };
         let is_flipped = self.boolean(object, "flip_normals", false);
         if self.shape_uses_coordinates(object) {
@@ -360,7 +360,7 @@ impl<'a> SceneReader<'a> {
         true
     }
 
-    fn add_rectangle(&mut self, object: &'a Object, target: ShapeTarget<'_>) -> bool {
+    fn add_rectangle(&mut self, object: &'a PluginInstance, target: ShapeTarget<'_>) -> bool {
         let Some(matrix) = self.shape_transform(object) else { return false };
         let is_flipped = self.boolean(object, "flip_normals", false);
         let corner = |x: f64, y: f64| matrix.transform_point3(DVec3::new(x, y, 0.0));
@@ -385,7 +385,7 @@ impl<'a> SceneReader<'a> {
         self.document.set("v", along);
     }
 
-    fn add_cube(&mut self, object: &'a Object, target: ShapeTarget<'_>) -> bool {
+    fn add_cube(&mut self, object: &'a PluginInstance, target: ShapeTarget<'_>) -> bool {
         let Some(matrix) = self.shape_transform(object) else { return false };
         let is_flipped = self.boolean(object, "flip_normals", false);
         object.property("face_normals");
@@ -417,7 +417,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Adds an instance, and its group if it is new.
-    fn add_instance(&mut self, object: &'a Object, target: ShapeTarget<'_>) -> bool {
+    fn add_instance(&mut self, object: &'a PluginInstance, target: ShapeTarget<'_>) -> bool {
         let Some(matrix) = self.shape_transform(object) else { return false };
         let Some(child) = self.children_of_kind(object, ObjectKind::Shape).next() else {
             let help = "add a <ref> to a `shapegroup`".to_owned();

@@ -1,8 +1,8 @@
 //! Converts textures.
 
-use super::graph::{Object, ObjectIndex, ObjectKind};
+use super::graph::{ObjectIndex, ObjectKind, PluginInstance};
 use super::material_key::UvConvention;
-use super::reader::{ColorRole, ColorSource, Entries, SceneReader, luminance};
+use super::reader::{ColorRole, ColorSource, MitsubaEntries, SceneReader, luminance};
 use super::settings::span_of;
 use super::xml::shorten;
 use crate::formats::rounding::{shorten as shorten_number, shorten_color};
@@ -11,7 +11,7 @@ use crate::scene::BuiltValue;
 
 /// What a texture is used for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(super) enum TextureUse {
+pub(super) enum MitsubaTextureUse {
     Color,
     Number,
     Normal,
@@ -50,14 +50,14 @@ impl UvMap {
     }
 
     /// Returns the keys `repeat`, `rotate` and `offset`, or `None` if the map shears or is degenerate.
-    fn keys(&self) -> Option<Entries> {
+    fn keys(&self) -> Option<MitsubaEntries> {
         let [[a, b], [c, d]] = self.rows;
         let (first, second) = (libm::hypot(a, c), libm::hypot(b, d));
         let is_valid = first > 1e-12 && second > 1e-12 && first.is_finite() && second.is_finite();
         if !is_valid || (a * b + c * d).abs() > 1e-6 * first * second {
             return None;
         }
-        let mut keys = Entries::new();
+        let mut keys = MitsubaEntries::new();
         let (repeat, angle) = if b.abs() <= 1e-9 * second && c.abs() <= 1e-9 * first {
             ([a, d], 0.0)
         } else {
@@ -84,7 +84,7 @@ impl<'a> SceneReader<'a> {
     pub(super) fn texture(
         &mut self,
         index: ObjectIndex,
-        usage: TextureUse,
+        usage: MitsubaTextureUse,
         uv: UvConvention,
     ) -> Option<String> {
         self.texture_with_factor(index, usage, uv, 1.0)
@@ -94,7 +94,7 @@ impl<'a> SceneReader<'a> {
     pub(super) fn texture_with_factor(
         &mut self,
         index: ObjectIndex,
-        usage: TextureUse,
+        usage: MitsubaTextureUse,
         uv: UvConvention,
         factor: f64,
     ) -> Option<String> {
@@ -160,7 +160,7 @@ impl<'a> SceneReader<'a> {
 
     /// Returns the value that reads a number from a texture.
     pub(super) fn number_texture(&mut self, index: ObjectIndex, uv: UvConvention) -> Option<BuiltValue> {
-        let name = self.texture(index, TextureUse::Number, uv)?;
+        let name = self.texture(index, MitsubaTextureUse::Number, uv)?;
         Some(self.channel_value(index, name))
     }
 
@@ -179,7 +179,7 @@ impl<'a> SceneReader<'a> {
 
     /// Returns the value of `bump`.
     pub(super) fn height_texture(&mut self, index: ObjectIndex, uv: UvConvention) -> Option<BuiltValue> {
-        let name = self.texture(index, TextureUse::Number, uv)?;
+        let name = self.texture(index, MitsubaTextureUse::Number, uv)?;
         Some(name.into())
     }
 
@@ -196,7 +196,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Whether an image may have an alpha channel: reads the color type of PNG files.
-    fn image_may_have_alpha(&mut self, object: &'a Object) -> bool {
+    fn image_may_have_alpha(&mut self, object: &'a PluginInstance) -> bool {
         let Some((name, span)) = self.text(object, "filename") else { return false };
         let Some(path) = self.find_file(name, &span) else { return false };
         match extension(&path.to_string_lossy()).as_str() {
@@ -213,10 +213,10 @@ impl<'a> SceneReader<'a> {
 
     fn bitmap_keys(
         &mut self,
-        object: &'a Object,
-        usage: TextureUse,
+        object: &'a PluginInstance,
+        usage: MitsubaTextureUse,
         uv: UvConvention,
-    ) -> Option<(Entries, String)> {
+    ) -> Option<(MitsubaEntries, String)> {
         let Some((name, span)) = self.text(object, "filename") else {
             self.error(object.span.clone(), "the texture needs `filename`", None);
             return None;
@@ -227,7 +227,7 @@ impl<'a> SceneReader<'a> {
             self.error(span, format!("glimt cannot read .{} images", shorten(&kind)), Some(help));
             return None;
         }
-        let mut keys: Entries = vec![("file", self.asset(name, &span, "image")?.into())];
+        let mut keys: MitsubaEntries = vec![("file", self.asset(name, &span, "image")?.into())];
         match self.text(object, "filter_type") {
             None | Some(("bilinear" | "trilinear" | "ewa", _)) => {}
             Some(("nearest", _)) => keys.push(("filter", "nearest".into())),
@@ -252,10 +252,10 @@ impl<'a> SceneReader<'a> {
         let is_raw = self.boolean(object, "raw", false);
         let gamma = self.float(object, "gamma");
         let is_float = FLOAT_IMAGES.contains(&kind.as_str());
-        if !is_float && usage != TextureUse::Normal {
+        if !is_float && usage != MitsubaTextureUse::Normal {
             let is_linear = is_raw || gamma == Some(1.0);
             keys.push(("encoding", if is_linear { "linear" } else { "srgb" }.into()));
-        } else if usage == TextureUse::Normal && !is_raw && !is_float {
+        } else if usage == MitsubaTextureUse::Normal && !is_raw && !is_float {
             let text = "decoded from sRGB in Mitsuba, but read as linear";
             self.notes.substitute_light("a normal map that is not `raw`", text, object.span.clone());
         }
@@ -272,7 +272,7 @@ impl<'a> SceneReader<'a> {
         Some((keys, stem.to_owned()))
     }
 
-    fn uv_keys(&mut self, object: &'a Object, uv: UvConvention, is_image: bool) -> Entries {
+    fn uv_keys(&mut self, object: &'a PluginInstance, uv: UvConvention, is_image: bool) -> MitsubaEntries {
         let to_uv =
             self.transform_value(object, "to_uv").map_or(DMat4::IDENTITY, |transform| transform.matrix);
         let keys = UvMap::new(&to_uv, uv, is_image).keys();
@@ -284,7 +284,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Colors of a checkerboard, which may not be textures themselves.
-    fn checker_colors(&mut self, object: &'a Object) -> [DVec3; 2] {
+    fn checker_colors(&mut self, object: &'a PluginInstance) -> [DVec3; 2] {
         let mut color =
             |name: &str, default: f64| match self.color(object, name, ColorRole::Reflectance, default) {
                 ColorSource::Constant(color) => color,
@@ -302,16 +302,16 @@ impl<'a> SceneReader<'a> {
 
     fn checkerboard_keys(
         &mut self,
-        object: &'a Object,
-        usage: TextureUse,
+        object: &'a PluginInstance,
+        usage: MitsubaTextureUse,
         uv: UvConvention,
-    ) -> Option<Entries> {
+    ) -> Option<MitsubaEntries> {
         let mut colors = self.checker_colors(object);
         match usage {
-            TextureUse::Color => {}
+            MitsubaTextureUse::Color => {}
             // Mitsuba swaps the colors when it evaluates a checkerboard as a number.
-            TextureUse::Number => colors.reverse(),
-            TextureUse::Normal => {
+            MitsubaTextureUse::Number => colors.reverse(),
+            MitsubaTextureUse::Normal => {
                 self.error(object.span.clone(), "a checkerboard is not a normal map", None);
                 return None;
             }
@@ -319,9 +319,15 @@ impl<'a> SceneReader<'a> {
         Some(self.checker_keys(object, colors, uv))
     }
 
-    fn checker_keys(&mut self, object: &'a Object, colors: [DVec3; 2], uv: UvConvention) -> Entries {
+    fn checker_keys(
+        &mut self,
+        object: &'a PluginInstance,
+        colors: [DVec3; 2],
+        uv: UvConvention,
+    ) -> MitsubaEntries {
         let colors = colors.map(shorten_color).to_vec();
-        let mut keys: Entries = vec![("type", "checker".into()), ("colors", BuiltValue::Array(colors))];
+        let mut keys: MitsubaEntries =
+            vec![("type", "checker".into()), ("colors", BuiltValue::Array(colors))];
         keys.extend(self.uv_keys(object, uv, false));
         keys
     }

@@ -10,7 +10,7 @@ use super::memo;
 use super::pixels::Pixels;
 use super::scene::SceneWriter;
 use super::texture_nodes::{ImageFilter, ImageNode, ImageWrap, TextureNode, UvMapping};
-use super::textures::{Entries, TextureUse, push_mapping};
+use super::textures::{PbrtEntries, PbrtTextureUse, push_mapping};
 use crate::assets::image::{ColorEncoding, ColorTransferFunction, ImageLimits, load_and_hash};
 use crate::assets::{AssetError, Companion};
 use crate::control::ignore_progress;
@@ -53,9 +53,9 @@ impl SceneWriter<'_> {
         {
             let sign = if image.is_inverted { -1.0 } else { 1.0 };
             let plain = ImageNode { factor: DVec3::ONE, is_inverted: false, ..image.clone() };
-            return (self.texture(&TextureNode::Image(plain), TextureUse::Height), sign * image.factor.x);
+            return (self.texture(&TextureNode::Image(plain), PbrtTextureUse::Height), sign * image.factor.x);
         }
-        (self.texture(node, TextureUse::Height), 1.0)
+        (self.texture(node, PbrtTextureUse::Height), 1.0)
     }
 
     /// Whether an image is gray without alpha, so that its first channel is the number that pbrt uses.
@@ -79,7 +79,7 @@ impl SceneWriter<'_> {
     }
 
     /// Returns the keys of a computed image, and its name.
-    pub(super) fn baked_keys(&mut self, node: &TextureNode, usage: TextureUse) -> (Entries, String) {
+    pub(super) fn baked_keys(&mut self, node: &TextureNode, usage: PbrtTextureUse) -> (PbrtEntries, String) {
         let mut leaves = Vec::new();
         collect_leaves(node, &mut leaves);
         let mut images = Images::new();
@@ -100,7 +100,7 @@ impl SceneWriter<'_> {
             let text = "the combination repeats after one unit";
             self.notes.substitute("textures with different scales", text, span.unwrap_or(0..0));
         }
-        let is_number = usage != TextureUse::Color;
+        let is_number = usage != PbrtTextureUse::Color;
         let pixels = bake(node, &images, &domain, usage);
         let name = leaves.iter().find_map(|leaf| match leaf {
             TextureNode::Image(image) => Some(stem(&image.file.text)),
@@ -108,7 +108,7 @@ impl SceneWriter<'_> {
         });
         let name = name.unwrap_or_else(|| "texture".to_owned());
         let file = self.add_generated_file(&name, "pfm", pixels.encode_pfm(is_number));
-        let mut keys: Entries = vec![("file", file.into())];
+        let mut keys: PbrtEntries = vec![("file", file.into())];
         if domain.wrap == ImageWrap::Clamp {
             keys.push(("wrap", "clamp".into()));
         }
@@ -239,7 +239,7 @@ fn domain_of(leaves: &[&TextureNode], images: &Images) -> (Domain, bool) {
 }
 
 /// Evaluates a texture at all texel centers. Heights are shifted so that none is negative.
-fn bake(node: &TextureNode, images: &Images, domain: &Domain, usage: TextureUse) -> Pixels {
+fn bake(node: &TextureNode, images: &Images, domain: &Domain, usage: PbrtTextureUse) -> Pixels {
     let [width, height] = domain.size;
     let row_values = |row: usize| {
         (0..width).map(move |column| {
@@ -250,7 +250,7 @@ fn bake(node: &TextureNode, images: &Images, domain: &Domain, usage: TextureUse)
         })
     };
     let mut values: Vec<Vec3> = (0..height).into_par_iter().flat_map_iter(row_values).collect();
-    if usage == TextureUse::Height {
+    if usage == PbrtTextureUse::Height {
         let least = values.iter().map(|value| value.x).fold(f32::INFINITY, f32::min);
         values.iter_mut().for_each(|value| *value -= least);
     }
@@ -333,7 +333,7 @@ mod tests {
         let mut leaves = Vec::new();
         collect_leaves(node, &mut leaves);
         let (domain, is_exact) = domain_of(&leaves, &images());
-        (bake(node, &images(), &domain, TextureUse::Number), domain, is_exact)
+        (bake(node, &images(), &domain, PbrtTextureUse::Number), domain, is_exact)
     }
 
     #[test]

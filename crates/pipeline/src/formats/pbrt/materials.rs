@@ -6,7 +6,7 @@ use super::parameters::{Parameters, Text};
 use super::scene::SceneWriter;
 use super::state::{ColorSpace, Entity};
 use super::texture_nodes::{ImageFilter, ImageNode, ImageWrap, TextureNode, TextureValue, UvMapping};
-use super::textures::{Entries, TextureUse};
+use super::textures::{PbrtEntries, PbrtTextureUse};
 use crate::formats::rounding::shorten_color;
 use crate::materials::conductor::elements::NamedConductor;
 use crate::math::{DVec3, Vec3};
@@ -24,7 +24,7 @@ pub(super) struct BlendPart {
 /// A material without the properties of shapes.
 pub(super) enum MaterialModel {
     Plain {
-        keys: Entries,
+        keys: PbrtEntries,
         /// Whether it uses texture coordinates or tangents.
         needs_uv: bool,
         /// Whether it is solid glass.
@@ -75,7 +75,7 @@ struct MaterialReader<'w, 'a> {
     writer: &'w mut SceneWriter<'a>,
     parameters: &'w Parameters,
     space: ColorSpace,
-    keys: Entries,
+    keys: PbrtEntries,
     needs_uv: bool,
 }
 
@@ -443,7 +443,7 @@ impl MaterialReader<'_, '_> {
             factor: DVec3::ONE,
             is_inverted: false,
         };
-        let name = self.writer.texture(&TextureNode::Image(image), TextureUse::Normal);
+        let name = self.writer.texture(&TextureNode::Image(image), PbrtTextureUse::Normal);
         self.keys.push(("normal_map", name.into()));
         Ok(())
     }

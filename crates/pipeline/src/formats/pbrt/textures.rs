@@ -9,11 +9,11 @@ use crate::math::DVec3;
 use crate::scene::BuiltValue;
 
 /// Keys and values of a table.
-pub(super) type Entries = Vec<(&'static str, BuiltValue)>;
+pub(super) type PbrtEntries = Vec<(&'static str, BuiltValue)>;
 
 /// The values of a texture that are used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum TextureUse {
+pub(super) enum PbrtTextureUse {
     Color,
     Number,
     /// Heights, whose factor is a separate key.
@@ -28,7 +28,7 @@ impl SceneWriter<'_> {
         if let Some(color) = node.as_constant() {
             return shorten_color(color);
         }
-        texture_value(self.texture(node, TextureUse::Color))
+        texture_value(self.texture(node, PbrtTextureUse::Color))
     }
 
     /// Returns the value of a number key.
@@ -37,7 +37,7 @@ impl SceneWriter<'_> {
         if let Some(number) = node.as_constant() {
             return number.x.into();
         }
-        let name = self.texture(node, TextureUse::Number);
+        let name = self.texture(node, PbrtTextureUse::Number);
         BuiltValue::Table(vec![("texture", name.into()), ("channel", "r".into())])
     }
 
@@ -75,7 +75,7 @@ impl SceneWriter<'_> {
     }
 
     /// Returns the name of the texture's table. Adds the table if it is new.
-    pub(super) fn texture(&mut self, node: &TextureNode, usage: TextureUse) -> String {
+    pub(super) fn texture(&mut self, node: &TextureNode, usage: PbrtTextureUse) -> String {
         let (keys, name) = match node {
             TextureNode::Image(image) if self.is_plain_image(image, usage) => {
                 (self.image_keys(image, usage), file_stem(&image.file.text))
@@ -98,7 +98,7 @@ impl SceneWriter<'_> {
     }
 
     /// Adds a table unless an equal one exists, and returns its name.
-    pub(super) fn add_texture_table(&mut self, keys: Entries, wanted: &str) -> String {
+    pub(super) fn add_texture_table(&mut self, keys: PbrtEntries, wanted: &str) -> String {
         let identity = format!("{keys:?}");
         if let Some(known) = self.textures.get(&identity) {
             return known.clone();
@@ -111,23 +111,23 @@ impl SceneWriter<'_> {
     }
 
     /// Whether glimt reads the image as it is.
-    fn is_plain_image(&mut self, image: &ImageNode, usage: TextureUse) -> bool {
+    fn is_plain_image(&mut self, image: &ImageNode, usage: PbrtTextureUse) -> bool {
         if image.wrap == ImageWrap::Black || image.mapping.scale.min_element() == 0.0 {
             return false;
         }
-        if image.factor.min_element() < 0.0 && usage != TextureUse::Height {
+        if image.factor.min_element() < 0.0 && usage != PbrtTextureUse::Height {
             return false;
         }
         match usage {
-            TextureUse::Color => !image.is_inverted,
-            TextureUse::Number => !image.is_inverted && self.is_gray_image(image),
-            TextureUse::Height => self.is_gray_image(image),
-            TextureUse::Normal => true,
+            PbrtTextureUse::Color => !image.is_inverted,
+            PbrtTextureUse::Number => !image.is_inverted && self.is_gray_image(image),
+            PbrtTextureUse::Height => self.is_gray_image(image),
+            PbrtTextureUse::Normal => true,
         }
     }
 
-    fn image_keys(&mut self, image: &ImageNode, usage: TextureUse) -> Entries {
-        let mut keys: Entries = vec![("file", self.asset_name(&image.file).into())];
+    fn image_keys(&mut self, image: &ImageNode, usage: PbrtTextureUse) -> PbrtEntries {
+        let mut keys: PbrtEntries = vec![("file", self.asset_name(&image.file).into())];
         match image.wrap {
             ImageWrap::Repeat | ImageWrap::Black => {}
             ImageWrap::Clamp => keys.push(("wrap", "clamp".into())),
@@ -139,18 +139,20 @@ impl SceneWriter<'_> {
         }
         let is_integer = !has_float_extension(&image.file.text);
         match usage {
-            TextureUse::Normal => {}
-            TextureUse::Color | TextureUse::Number | TextureUse::Height if image.is_linear => {
+            PbrtTextureUse::Normal => {}
+            PbrtTextureUse::Color | PbrtTextureUse::Number | PbrtTextureUse::Height if image.is_linear => {
                 keys.push(("encoding", "linear".into()));
             }
             // Numbers are decoded like colors.
-            TextureUse::Number | TextureUse::Height if is_integer => keys.push(("encoding", "srgb".into())),
-            TextureUse::Color | TextureUse::Number | TextureUse::Height => {}
+            PbrtTextureUse::Number | PbrtTextureUse::Height if is_integer => {
+                keys.push(("encoding", "srgb".into()))
+            }
+            PbrtTextureUse::Color | PbrtTextureUse::Number | PbrtTextureUse::Height => {}
         }
         push_mapping(&mut keys, image.mapping, 1.0);
-        if usage == TextureUse::Color && image.factor != DVec3::ONE {
+        if usage == PbrtTextureUse::Color && image.factor != DVec3::ONE {
             keys.push(("factor", shorten_color(image.factor)));
-        } else if usage == TextureUse::Number && image.factor.x != 1.0 {
+        } else if usage == PbrtTextureUse::Number && image.factor.x != 1.0 {
             keys.push(("factor", image.factor.x.into()));
         }
         keys
@@ -173,7 +175,7 @@ fn file_stem(file: &str) -> String {
 }
 
 /// Adds `repeat` and `offset`. `cells` is the number of pbrt's units per repetition.
-pub(super) fn push_mapping(keys: &mut Entries, mapping: UvMapping, cells: f64) {
+pub(super) fn push_mapping(keys: &mut PbrtEntries, mapping: UvMapping, cells: f64) {
     let UvMapping { scale, offset } = mapping;
     if scale / cells != crate::math::DVec2::ONE {
         keys.push(("repeat", (scale / cells).to_array().into()));
@@ -184,16 +186,16 @@ pub(super) fn push_mapping(keys: &mut Entries, mapping: UvMapping, cells: f64) {
 }
 
 /// glimt's checkers have two cells per repetition.
-fn checker_keys(mapping: UvMapping, colors: [DVec3; 2]) -> Entries {
+fn checker_keys(mapping: UvMapping, colors: [DVec3; 2]) -> PbrtEntries {
     let colors = colors.map(|color| color.max(DVec3::ZERO)).map(shorten_color).to_vec();
-    let mut keys: Entries =
+    let mut keys: PbrtEntries =
         vec![("type", "checker".into()), ("colors", BuiltValue::Array(colors)), ("filter", "mipmap".into())];
     push_mapping(&mut keys, mapping, 2.0);
     keys
 }
 
 /// Noise from 0 to `factor`.
-fn noise_keys(octaves: u32, factor: f64) -> Entries {
+fn noise_keys(octaves: u32, factor: f64) -> PbrtEntries {
     let colors = BuiltValue::Array(vec![0.0.into(), factor.abs().into()]);
     vec![("type", "noise".into()), ("colors", colors), ("octaves", f64::from(octaves).into())]
 }

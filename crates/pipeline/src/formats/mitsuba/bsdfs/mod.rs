@@ -3,10 +3,10 @@
 mod nested;
 mod surfaces;
 
-use super::graph::{Child, Object, ObjectIndex, ObjectKind};
+use super::graph::{Child, ObjectIndex, ObjectKind, PluginInstance};
 use super::material_key::{MaterialKey, UvConvention};
-use super::reader::{ColorRole, ColorSource, Entries, NumberSource, SceneReader, luminance};
-use super::textures::TextureUse;
+use super::reader::{ColorRole, ColorSource, MitsubaEntries, NumberSource, SceneReader, luminance};
+use super::textures::MitsubaTextureUse;
 use crate::formats::rounding::{shorten as shorten_number, shorten_color};
 use crate::math::DVec3;
 use crate::scene::BuiltValue;
@@ -61,7 +61,7 @@ pub(super) struct BsdfContext {
 #[derive(Debug, Default)]
 pub(super) struct MaterialBuilder {
     /// The keys, including `type`.
-    keys: Entries,
+    keys: MitsubaEntries,
     /// Whether the surface is an index-matched boundary that has no effect.
     is_invisible: bool,
     /// Whether the material transmits light as glass.
@@ -74,13 +74,13 @@ pub(super) struct MaterialBuilder {
 }
 
 impl MaterialBuilder {
-    fn new(kind: &'static str, keys: Entries) -> Self {
+    fn new(kind: &'static str, keys: MitsubaEntries) -> Self {
         let keys = std::iter::once(("type", kind.into())).chain(keys).collect();
         Self { keys, ..Self::default() }
     }
 
     /// A material whose back is black unless a `twosided` contains it.
-    fn one_sided(kind: &'static str, keys: Entries) -> Self {
+    fn one_sided(kind: &'static str, keys: MitsubaEntries) -> Self {
         Self { is_one_sided: true, ..Self::new(kind, keys) }
     }
 
@@ -100,7 +100,7 @@ impl<'a> SceneReader<'a> {
         bsdf: Option<&'a Child>,
         emitter: Option<ObjectIndex>,
         uv: UvConvention,
-        shape: &'a Object,
+        shape: &'a PluginInstance,
     ) -> Option<String> {
         let index = bsdf.map(|child| child.target);
         let has_textures = index.into_iter().chain(emitter).any(|index| self.has_textures(index));
@@ -171,7 +171,7 @@ impl<'a> SceneReader<'a> {
         builder: &mut MaterialBuilder,
         emitter: ObjectIndex,
         uv: UvConvention,
-        shape: &'a Object,
+        shape: &'a PluginInstance,
     ) {
         let emitter = self.object(emitter);
         if builder.is_blend {
@@ -189,7 +189,7 @@ impl<'a> SceneReader<'a> {
                     builder.keys.push(("emission", shorten_color(color)));
                 }
             }
-            ColorSource::Texture(texture) => match self.texture(texture, TextureUse::Color, uv) {
+            ColorSource::Texture(texture) => match self.texture(texture, MitsubaTextureUse::Color, uv) {
                 Some(name) => {
                     builder.keys.push(("emission", BuiltValue::Table(vec![("texture", name.into())])));
                 }
@@ -267,7 +267,7 @@ impl<'a> SceneReader<'a> {
         })
     }
 
-    fn refused(&mut self, object: &Object, what: &str) -> Option<MaterialBuilder> {
+    fn refused(&mut self, object: &PluginInstance, what: &str) -> Option<MaterialBuilder> {
         self.refuse(object, what);
         None
     }
@@ -275,7 +275,7 @@ impl<'a> SceneReader<'a> {
     /// Converts a reflectance or transmittance to the value of a color key.
     fn reflectance(
         &mut self,
-        object: &'a Object,
+        object: &'a PluginInstance,
         name: &str,
         default: f64,
         context: BsdfContext,
@@ -289,7 +289,7 @@ impl<'a> SceneReader<'a> {
         match color {
             ColorSource::Constant(color) => shorten_color(color * factor),
             ColorSource::Texture(texture) => {
-                match self.texture_with_factor(texture, TextureUse::Color, context.uv, factor) {
+                match self.texture_with_factor(texture, MitsubaTextureUse::Color, context.uv, factor) {
                     Some(name) => BuiltValue::Table(vec![("texture", name.into())]),
                     None => {
                         let color = self.constant_of_texture(texture, ColorRole::Reflectance);

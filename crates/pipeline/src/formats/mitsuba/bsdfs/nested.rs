@@ -1,10 +1,10 @@
 //! Converts BSDFs that contain other BSDFs.
 
 use super::{BsdfContext, MaterialBuilder};
-use crate::formats::mitsuba::graph::{Child, Object, ObjectIndex, ObjectKind};
+use crate::formats::mitsuba::graph::{Child, ObjectIndex, ObjectKind, PluginInstance};
 use crate::formats::mitsuba::property::PropertyValue;
-use crate::formats::mitsuba::reader::{ColorRole, ColorSource, Entries, NumberSource, SceneReader};
-use crate::formats::mitsuba::textures::TextureUse;
+use crate::formats::mitsuba::reader::{ColorRole, ColorSource, MitsubaEntries, NumberSource, SceneReader};
+use crate::formats::mitsuba::textures::MitsubaTextureUse;
 use crate::formats::mitsuba::xml::shorten;
 use crate::formats::rounding::{shorten as shorten_number, shorten_color};
 use crate::math::DVec3;
@@ -12,7 +12,7 @@ use crate::scene::BuiltValue;
 
 impl<'a> SceneReader<'a> {
     /// Returns the single nested BSDF.
-    pub(super) fn nested_bsdf(&mut self, object: &'a Object) -> Option<&'a Child> {
+    pub(super) fn nested_bsdf(&mut self, object: &'a PluginInstance) -> Option<&'a Child> {
         let nested = self.children_of_kind(object, ObjectKind::Bsdf).next();
         if nested.is_none() {
             let message = format!("`{}` needs a nested BSDF", shorten(&object.plugin));
@@ -21,7 +21,11 @@ impl<'a> SceneReader<'a> {
         nested
     }
 
-    pub(super) fn two_sided(&mut self, object: &'a Object, context: BsdfContext) -> Option<MaterialBuilder> {
+    pub(super) fn two_sided(
+        &mut self,
+        object: &'a PluginInstance,
+        context: BsdfContext,
+    ) -> Option<MaterialBuilder> {
         let nested = self.nested_bsdf(object)?;
         if let Some(second) = self.children_of_kind(object, ObjectKind::Bsdf).nth(1)
             && second.target != nested.target
@@ -70,7 +74,11 @@ impl<'a> SceneReader<'a> {
         built.keys.push(("opacity", value));
     }
 
-    pub(super) fn blend(&mut self, object: &'a Object, context: BsdfContext) -> Option<MaterialBuilder> {
+    pub(super) fn blend(
+        &mut self,
+        object: &'a PluginInstance,
+        context: BsdfContext,
+    ) -> Option<MaterialBuilder> {
         let nested: Vec<&Child> = self.children_of_kind(object, ObjectKind::Bsdf).collect();
         if object.plugin == "mixturebsdf" {
             object.property("weights");
@@ -154,7 +162,7 @@ impl<'a> SceneReader<'a> {
         self.ignored_scale(object, "specular_reflectance");
         let roughness = match object.plugin.as_str() {
             "roughcoating" => {
-                let mut keys = Entries::new();
+                let mut keys = MitsubaEntries::new();
                 self.add_distribution(&mut keys, object, 0.1, context, false);
                 keys.into_iter().find(|(key, _)| *key == "roughness").map_or(0.3.into(), |(_, value)| value)
             }
@@ -177,7 +185,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Returns the nested texture of a bump or normal map.
-    pub(super) fn nested_texture(&mut self, object: &'a Object) -> Option<ObjectIndex> {
+    pub(super) fn nested_texture(&mut self, object: &'a PluginInstance) -> Option<ObjectIndex> {
         let texture = self.children_of_kind(object, ObjectKind::Texture).next();
         if texture.is_none() {
             let message = format!("`{}` needs a nested texture", shorten(&object.plugin));
@@ -186,7 +194,11 @@ impl<'a> SceneReader<'a> {
         texture.map(|child| child.target)
     }
 
-    pub(super) fn bump_map(&mut self, object: &'a Object, context: BsdfContext) -> Option<MaterialBuilder> {
+    pub(super) fn bump_map(
+        &mut self,
+        object: &'a PluginInstance,
+        context: BsdfContext,
+    ) -> Option<MaterialBuilder> {
         let nested = self.nested_bsdf(object)?;
         let texture = self.nested_texture(object)?;
         let mut scale = self.float(object, "scale").unwrap_or(1.0);
@@ -217,7 +229,11 @@ impl<'a> SceneReader<'a> {
         Some(built)
     }
 
-    pub(super) fn normal_map(&mut self, object: &'a Object, context: BsdfContext) -> Option<MaterialBuilder> {
+    pub(super) fn normal_map(
+        &mut self,
+        object: &'a PluginInstance,
+        context: BsdfContext,
+    ) -> Option<MaterialBuilder> {
         let nested = self.nested_bsdf(object)?;
         if let Some(constant) = object.named_child("normalmap").map(|child| self.object(child.target))
             && constant.plugin == "rawconstant"
@@ -239,7 +255,7 @@ impl<'a> SceneReader<'a> {
             );
             return Some(built);
         }
-        if let Some(name) = self.texture(texture, TextureUse::Normal, context.uv) {
+        if let Some(name) = self.texture(texture, MitsubaTextureUse::Normal, context.uv) {
             built.keys.push(("normal_map", name.into()));
             let text = "light fades as the normal tilts: 2 % darker at 7 degrees";
             self.notes.note("bump and normal maps", text, object.span.clone());
@@ -248,7 +264,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Reports a constant normal map, unless it is the identity.
-    pub(super) fn note_constant_normal_map(&mut self, constant: &'a Object) {
+    pub(super) fn note_constant_normal_map(&mut self, constant: &'a PluginInstance) {
         let value = constant.property("value").map(|property| &property.value);
         if value != Some(&PropertyValue::Vector(DVec3::new(0.5, 0.5, 1.0))) {
             self.notes.substitute_light("a constant normal map", "left out", constant.span.clone());

@@ -4,11 +4,11 @@ use super::{AIR, BsdfContext, MaterialBuilder};
 use crate::choice::Choice;
 use crate::formats::foreign::ior::{dielectric_ior, dielectric_names};
 use crate::formats::foreign::spectra::flat_emission_color;
-use crate::formats::mitsuba::graph::Object;
+use crate::formats::mitsuba::graph::PluginInstance;
 use crate::formats::mitsuba::plastic::{PlasticCoat, remapped_reflectance};
 use crate::formats::mitsuba::property::PropertyValue;
 use crate::formats::mitsuba::reader::{
-    ColorRole, ColorSource, Entries, NumberSource, SceneReader, luminance,
+    ColorRole, ColorSource, MitsubaEntries, NumberSource, SceneReader, luminance,
 };
 use crate::formats::mitsuba::settings::span_of;
 use crate::formats::mitsuba::xml::shorten;
@@ -20,7 +20,7 @@ use crate::scene::nearest::nearest_name;
 
 impl<'a> SceneReader<'a> {
     /// Returns a color scale that glimt lacks, unless it is 1.
-    pub(super) fn ignored_scale(&mut self, object: &'a Object, name: &str) {
+    pub(super) fn ignored_scale(&mut self, object: &'a PluginInstance, name: &str) {
         let scale = self.color(object, name, ColorRole::Reflectance, 1.0);
         if scale != ColorSource::Constant(DVec3::ONE) {
             let subject = format!("`{name}` of `{}`", shorten(&object.plugin));
@@ -29,7 +29,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Returns an index of refraction, which may be the name of a substance.
-    pub(super) fn ior(&mut self, object: &'a Object, name: &str, default: f64) -> f64 {
+    pub(super) fn ior(&mut self, object: &'a PluginInstance, name: &str, default: f64) -> f64 {
         let Some(property) = object.property(name) else { return default };
         let PropertyValue::Text(substance) = &property.value else {
             return self.float(object, name).filter(|ior| *ior > 0.0).unwrap_or_else(|| {
@@ -56,7 +56,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Index of refraction of the inside relative to the outside.
-    pub(super) fn relative_ior(&mut self, object: &'a Object, default: f64) -> f64 {
+    pub(super) fn relative_ior(&mut self, object: &'a PluginInstance, default: f64) -> f64 {
         let inside = self.ior(object, "int_ior", default);
         let outside = self.ior(object, "ext_ior", AIR);
         let ratio = inside / outside;
@@ -73,8 +73,8 @@ impl<'a> SceneReader<'a> {
     /// Adds the keys of a microfacet distribution: `roughness`, `anisotropy` and `distribution`.
     pub(super) fn add_distribution(
         &mut self,
-        keys: &mut Entries,
-        object: &'a Object,
+        keys: &mut MitsubaEntries,
+        object: &'a PluginInstance,
         default_alpha: f64,
         context: BsdfContext,
         may_be_anisotropic: bool,
@@ -143,7 +143,7 @@ impl<'a> SceneReader<'a> {
     pub(super) fn roughness_value(
         &mut self,
         alpha: NumberSource,
-        object: &'a Object,
+        object: &'a PluginInstance,
         context: BsdfContext,
     ) -> BuiltValue {
         match alpha {
@@ -161,7 +161,11 @@ impl<'a> SceneReader<'a> {
         }
     }
 
-    pub(super) fn conductor(&mut self, object: &'a Object, context: BsdfContext) -> Option<MaterialBuilder> {
+    pub(super) fn conductor(
+        &mut self,
+        object: &'a PluginInstance,
+        context: BsdfContext,
+    ) -> Option<MaterialBuilder> {
         let is_rough = object.plugin == "roughconductor";
         let material = self.text(object, "material");
         let has_eta = object.property("eta").is_some() || object.named_child("eta").is_some();
@@ -180,7 +184,7 @@ impl<'a> SceneReader<'a> {
             self.add_distribution(&mut keys, object, 0.1, context, true);
             return Some(MaterialBuilder::one_sided("metal", keys));
         }
-        let mut keys = Entries::new();
+        let mut keys = MitsubaEntries::new();
         if has_eta {
             let eta = self.color(object, "eta", ColorRole::Unbounded, 0.0);
             let k = self.color(object, "k", ColorRole::Unbounded, 1.0);
@@ -225,7 +229,7 @@ impl<'a> SceneReader<'a> {
         &mut self,
         mut metal: MaterialBuilder,
         scale: ColorSource,
-        object: &'a Object,
+        object: &'a PluginInstance,
         context: BsdfContext,
     ) -> MaterialBuilder {
         let weight = match scale {
@@ -279,9 +283,9 @@ impl<'a> SceneReader<'a> {
         MaterialBuilder { is_blend: true, ..MaterialBuilder::new("blend", keys) }
     }
 
-    pub(super) fn dielectric(&mut self, object: &'a Object, context: BsdfContext) -> MaterialBuilder {
+    pub(super) fn dielectric(&mut self, object: &'a PluginInstance, context: BsdfContext) -> MaterialBuilder {
         let ior = self.relative_ior(object, 1.5046);
-        let mut keys: Entries = vec![("ior", shorten_number(ior).into())];
+        let mut keys: MitsubaEntries = vec![("ior", shorten_number(ior).into())];
         self.ignored_scale(object, "specular_reflectance");
         match object.plugin.as_str() {
             "thindielectric" => {
@@ -301,12 +305,12 @@ impl<'a> SceneReader<'a> {
         MaterialBuilder { is_glass: true, ..MaterialBuilder::new("glass", keys) }
     }
 
-    pub(super) fn plastic(&mut self, object: &'a Object, context: BsdfContext) -> MaterialBuilder {
+    pub(super) fn plastic(&mut self, object: &'a PluginInstance, context: BsdfContext) -> MaterialBuilder {
         let ior = self.relative_ior(object, 1.49).max(1.0);
         let is_nonlinear = self.boolean(object, "nonlinear", false);
-        let mut keys: Entries = vec![("ior", shorten_number(ior).into())];
+        let mut keys: MitsubaEntries = vec![("ior", shorten_number(ior).into())];
         let alpha = if object.plugin == "roughplastic" {
-            let (mut distribution, mut alpha) = (Entries::new(), 0.1);
+            let (mut distribution, mut alpha) = (MitsubaEntries::new(), 0.1);
             if let NumberSource::Constant(constant) = self.number(object, "alpha", 0.1) {
                 alpha = constant.clamp(1e-4, 1.0);
             }
@@ -349,7 +353,7 @@ impl<'a> SceneReader<'a> {
         *self.plastic_coats.entry(key).or_insert_with(|| PlasticCoat::new(ior, alpha, is_beckmann))
     }
 
-    pub(super) fn phong(&mut self, object: &'a Object, context: BsdfContext) -> MaterialBuilder {
+    pub(super) fn phong(&mut self, object: &'a PluginInstance, context: BsdfContext) -> MaterialBuilder {
         let diffuse = self.reflectance(object, "diffuse_reflectance", 0.5, context);
         let specular = self.reflectance(object, "specular_reflectance", 0.2, context);
         let exponent = match self.number(object, "exponent", 30.0) {
@@ -367,7 +371,7 @@ impl<'a> SceneReader<'a> {
         MaterialBuilder::one_sided("phong", keys)
     }
 
-    pub(super) fn ward(&mut self, object: &'a Object, context: BsdfContext) -> MaterialBuilder {
+    pub(super) fn ward(&mut self, object: &'a PluginInstance, context: BsdfContext) -> MaterialBuilder {
         self.notes.substitute_light(
             "`ward`",
             "replaced by Phong with a highlight of the same width",
@@ -390,8 +394,8 @@ impl<'a> SceneReader<'a> {
         MaterialBuilder::one_sided("phong", keys)
     }
 
-    pub(super) fn principled(&mut self, object: &'a Object, context: BsdfContext) -> MaterialBuilder {
-        let mut keys: Entries = vec![("color", self.reflectance(object, "base_color", 0.5, context))];
+    pub(super) fn principled(&mut self, object: &'a PluginInstance, context: BsdfContext) -> MaterialBuilder {
+        let mut keys: MitsubaEntries = vec![("color", self.reflectance(object, "base_color", 0.5, context))];
         for (name, key, default) in
             [("metallic", "metallic", 0.0), ("roughness", "roughness", 0.5), ("clearcoat", "clearcoat", 0.0)]
         {
