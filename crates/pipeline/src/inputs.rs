@@ -36,7 +36,8 @@ impl ProtectedInputs {
         let loaded = &parsed.loaded;
         let scene = &loaded.scene;
         let path = loaded.path.clone();
-        let role = if loaded.is_foreign() && has_model_extension(&path) { "the model" } else { "the scene file" };
+        let role =
+            if loaded.is_foreign() && has_model_extension(&path) { "the model" } else { "the scene file" };
         let mut inputs = Self(vec![ProtectedInput { path, role: role.to_owned(), place: None }]);
         let mut add = |path: &Path, span: &Range<usize>, role: String| {
             let place = Some((Arc::clone(loaded), span.clone()));

@@ -21,6 +21,7 @@ mod read;
 pub mod report;
 pub mod sanitize;
 mod source;
+mod source_files;
 mod toml;
 
 // Modules of lower-level crates, under the names used throughout the workspace.
@@ -40,7 +41,8 @@ pub use facing::MeshBoundingBox;
 pub use key_path::{key_parts, shortened_key, split_at_unquoted_space};
 pub use other_content::{NEW_SCENE_HELP, detect_image_or_part, has_scene_extension};
 pub use read::{find_renamed_scene, lacks_camera_header, missing_file_help};
-pub use source::{SceneText, SourceFiles};
+pub use source::SceneText;
+pub use source_files::SourceFiles;
 
 /// Maximum size of a scene file in bytes.
 pub const MAX_FILE_BYTES: u64 = 128 << 20;
@@ -207,7 +209,8 @@ pub fn load_built(
     path: &Path,
     sets: &[String],
 ) -> Result<LoadedScene, Vec<Diagnostic>> {
-    let source = SceneText::with_set_args(Arc::clone(&built.source), sets)?.mark_foreign(Arc::clone(&built.files));
+    let source =
+        SceneText::with_set_args(Arc::clone(&built.source), sets)?.mark_foreign(Arc::clone(&built.files));
     let outcome = document::lower_built(&source, &built.document, path);
     let named = if sets.is_empty() { Vec::new() } else { document::referenced_files(&built.document, path) };
     loaded_scene(outcome, source, Some(Arc::new(built)), path, named)

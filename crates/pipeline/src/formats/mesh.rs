@@ -4,12 +4,12 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
+use super::foreign::ForeignError;
 use super::frame::{FOV, frame_model};
 use super::model::{
     DEFAULT_SIZE, Lighting, POLISHED_EXPONENT, POLISHED_ROUGHNESS, UsedNames, add_camera, add_ground,
     add_render_settings, add_sky_and_key_light, file_name, warning,
 };
-use super::foreign::ForeignError;
 use super::{ForeignReadContext, ForeignScene};
 use crate::assets::gltf::ModelProjection;
 use crate::assets::{AssetError, FileMaterial, LoadedMesh};

@@ -36,7 +36,12 @@ pub use import::{ImportError, import_scene};
 
 /// All foreign formats.
 const FORMATS: [ForeignFormat; 5] = [
-    ForeignFormat { extensions: &["obj", "off", "serialized"], is_model: true, read: mesh::read, convert: None },
+    ForeignFormat {
+        extensions: &["obj", "off", "serialized"],
+        is_model: true,
+        read: mesh::read,
+        convert: None,
+    },
     ForeignFormat { extensions: &["ply"], is_model: true, read: mesh::read_ply, convert: None },
     ForeignFormat { extensions: &["stl"], is_model: true, read: mesh::read_stl, convert: None },
     ForeignFormat {
@@ -128,7 +133,11 @@ pub(crate) fn lower(
     load_built(document, path, sets).map_err(|mut errors| {
         // Mark errors in generated values, which the user cannot see. Errors in overrides need no mark.
         for error in errors.iter_mut().filter(|error| error.path == path && error.place.is_none()) {
-            let what = if has_model_extension(path) { "generated for this model" } else { "converted from this file" };
+            let what = if has_model_extension(path) {
+                "generated for this model"
+            } else {
+                "converted from this file"
+            };
             error.message = format!("in the scene {what}, {}", error.message);
         }
         errors
@@ -262,7 +271,10 @@ mod tests {
             let Diagnostic { message, help, .. } = message(&path);
             let help = help.expect("a help text");
             if name == "d.FBX" {
-                assert!(message.contains(".fbx") && help.contains(".obj, .off, .serialized, .ply, .stl, .glb, .gltf"));
+                assert!(
+                    message.contains(".fbx")
+                        && help.contains(".obj, .off, .serialized, .ply, .stl, .glb, .gltf")
+                );
             } else {
                 assert_eq!(message, "this is a mesh, not a scene");
                 assert!(help.contains(&format!("`file = \"{name}\"`")), "{help}");

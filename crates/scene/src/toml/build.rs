@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::tree::{Document, Name, NodeKind, Span, TableId, TableOrigin, ValueNode};
 use super::write::{Comment, format_document};
 use crate::math::DVec3;
-use crate::source::{SourceFile, SourceFiles};
+use crate::source_files::{SourceFile, SourceFiles};
 
 /// A scene document built in memory: the tables and keys of a scene file, and comments.
 ///
@@ -94,7 +94,14 @@ impl BuiltDocument {
     /// Creates an empty document. `source` is the text of the foreign file, or empty if the file is not text.
     pub fn new(source: Arc<str>) -> Self {
         let (comments, span) = Default::default();
-        Self { document: Document::new(""), source, files: Arc::new([]), comments, table: Document::ROOT, span }
+        Self {
+            document: Document::new(""),
+            source,
+            files: Arc::new([]),
+            comments,
+            table: Document::ROOT,
+            span,
+        }
     }
 
     /// Creates an empty document for a foreign scene that consists of several text files.

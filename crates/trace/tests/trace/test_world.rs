@@ -9,8 +9,8 @@ use crate::geometry::mesh::TriangleMesh;
 use crate::materials::texels::Texels;
 use crate::math::{DVec3, Vec3};
 use crate::scene::description::{
-    Accel, Environment, MapOrientation, MapRows, MeshFile, MeshReference, Object, ObjectTransform, Scene, Shape,
-    Spanned,
+    Accel, Environment, MapOrientation, MapRows, MeshFile, MeshReference, Object, ObjectTransform, Scene,
+    Shape, Spanned,
 };
 use crate::world::{
     EnvironmentSource, Geometry, Images, MeshTree, World, WorldInputs, build_environment_map, build_lights,

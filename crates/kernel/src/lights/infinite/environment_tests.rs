@@ -138,7 +138,10 @@ fn rows_at_the_poles_are_interpolated_exactly() {
         for i in 0..count {
             let (direction, color, pdf) = map.sample(random_pair(i), 0.25);
             let (looked_up, same_pdf) = map.lookup_color_and_pdf(direction, 0.25);
-            assert!((color - looked_up).length() < 1e-3 && (pdf / same_pdf - 1.0).abs() < 1e-2, "{direction}");
+            assert!(
+                (color - looked_up).length() < 1e-3 && (pdf / same_pdf - 1.0).abs() < 1e-2,
+                "{direction}"
+            );
             sum += f64::from(color.x / pdf);
         }
         // ∫ θ/π dω = 2π.

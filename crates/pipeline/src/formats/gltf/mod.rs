@@ -7,13 +7,13 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use self::materials::{MaterialBuilder, TextureFileReference};
+use super::foreign::ForeignError;
 use super::frame::{CameraPose, FOV, frame_model, round_to_decimals_of_step};
 use super::model::{
     DEFAULT_SIZE, Lighting, ModelViewOptions, POLISHED_ROUGHNESS, UsedNames, add_camera, add_ground,
     add_render_settings, add_sky_and_key_light, file_name, warning,
 };
 use super::rounding::{shorten, shorten_color, shorten_vector};
-use super::foreign::ForeignError;
 use super::{ForeignReadContext, ForeignScene, ImportedScene, lower};
 use crate::assets::gltf::{
     Alpha, GltfFile, ImageLocation, ModelCamera, ModelInstance, ModelLight, ModelLightKind, ModelMaterial,
