@@ -21,6 +21,7 @@ mod read;
 pub mod report;
 pub mod sanitize;
 mod source;
+mod source_files;
 mod toml;
 
 // Modules of lower-level crates, under the names used throughout the workspace.
@@ -41,7 +42,8 @@ pub use facing::MeshBoundingBox;
 pub use key_path::{shortened_key, split_at_unquoted_space, split_dotted_key};
 pub use other_content::{NEW_SCENE_HELP, detect_image_or_part_file, has_scene_extension};
 pub use read::{find_renamed_scene_by_text, lacks_camera_header, missing_file_help};
-pub use source::{SceneText, SourceFiles};
+pub use source::SceneText;
+pub use source_files::SourceFiles;
 
 /// Maximum size of a scene file in bytes.
 pub const MAX_FILE_BYTES: u64 = 128 << 20;

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use super::tree::{Document, Name, NodeKind, Span, TableId, TableOrigin, ValueNode};
 use super::write::{Comment, format_document};
 use crate::math::DVec3;
-use crate::source::{SourceFile, SourceFiles};
+use crate::source_files::{SourceFile, SourceFiles};
 
 /// A scene document built in memory: the tables and keys of a scene file, and comments.
 ///
