@@ -82,12 +82,12 @@ fn techniques_agree_on_area_lights() {
             // Without occluders, the shadow mode has no effect.
             let [off, hard] =
                 [ShadowMode::Off, ShadowMode::Hard].map(|kind| whitted.clone().shadows(kind, 1));
-            let path = mean_and_error(&path_traced(build, 1).values(256, 16));
+            let path = mean_and_error(&path_traced(build, 1).values(400, 16));
             let others = [("whitted", &whitted), ("unshadowed", &off), ("hard", &hard)];
             // In these two cases, a ball occludes part of a light.
             let others = if ["two", "half a sun"].contains(&what) { &others[..1] } else { &others[..] };
             for &(technique, build) in others {
-                let found = mean_and_error(&build.values(256, 16));
+                let found = mean_and_error(&build.values(400, 16));
                 assert_same_mean(&format!("{material}, {what}, {technique}"), found, path, 0.03);
             }
         }
