@@ -202,7 +202,7 @@ fn albedos_over_a_leaf_match_quadrature() {
     let leaf = translucent(Vec3::splat(kd), 0.0, Vec3::splat(kt));
     let [kd, kt] = [kd, kt].map(f64::from);
     for alpha in [0.001, 0.05, 0.3, 1.0] {
-        let means = (0..32).map(|i| reference_albedo(alpha, ((f64::from(i) + 0.5) / 32.0).sqrt()) / 32.0);
+        let means = (0..128).map(|i| reference_albedo(alpha, ((f64::from(i) + 0.5) / 128.0).sqrt()) / 128.0);
         let mean: f64 = means.sum();
         let point = coated(leaf, 1.0, alpha, 1.5, Vec3::ONE);
         for cosine in COSINES {
@@ -211,10 +211,12 @@ fn albedos_over_a_leaf_match_quadrature() {
             let front = TestSurface::<Front>::new(&point, [alpha; 2], at);
             let behind =
                 TestSurface::<Behind>::with_light_path(&point, [alpha; 2], at, NarrowLightPath::Through);
-            let [reflected, transmitted] = [front.lobe_stratified_albedo(48).x, behind.sampled_albedo(128).x];
-            // Both sides are coated, and light passes one coat on each.
-            let passed = (1.0 - coat) * (1.0 - mean);
-            let exact = [coat + passed * kd / (1.0 - kd * mean), passed * kt];
+            let [reflected, transmitted] =
+                [front.lobe_stratified_albedo(160).x, behind.lobe_stratified_albedo(96).x];
+            // Both sides are coated, and light passes one coat on each. The coat reflects a part of the light
+            // from the leaf back to it.
+            let passed = (1.0 - coat) * (1.0 - mean) / (1.0 - kd * mean);
+            let exact = [coat + passed * kd, passed * kt];
             let what = format!("α {alpha} at {cosine}: {reflected}, {transmitted} instead of {exact:?}");
             assert!((reflected - exact[0]).abs() < 1e-3 && (transmitted - exact[1]).abs() < 1e-3, "{what}");
             assert!(reflected + transmitted < 1.0 + 5e-4, "{what}");
