@@ -145,7 +145,7 @@ impl SceneWriter<'_> {
             }
             // Numbers are decoded like colors.
             PbrtTextureUse::Number | PbrtTextureUse::Height if is_integer => {
-                keys.push(("encoding", "srgb".into()))
+                keys.push(("encoding", "srgb".into()));
             }
             PbrtTextureUse::Color | PbrtTextureUse::Number | PbrtTextureUse::Height => {}
         }
