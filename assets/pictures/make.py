@@ -23,6 +23,7 @@ PICTURES = {
     "environment.jpg": "--width 960 --height 600 --samples 512",
     "metals.jpg": "--width 960 --height 533 --samples 4096",
     "leaves.jpg": "--width 960 --height 720 --samples 256 --clamp 1",
+    "racer.jpg": "--width 960 --height 630 --samples 512 --time 80",
     "textures.png": "--width 320 --height 240 --samples 128",
     "ring.png": "--width 480 --height 320 --samples 64",
     "shapes.png": "--width 480 --height 300 --samples 96",
