@@ -1,8 +1,8 @@
-//! What the materials of the document depend on.
+//! Identifies materials that several shapes share.
 
 use super::graph::ObjectIndex;
 
-/// What a material of the document depends on.
+/// Everything that determines a material of the document. Shapes with equal keys share a material.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(super) struct MaterialKey {
     /// The BSDF, or `None` for the default one.

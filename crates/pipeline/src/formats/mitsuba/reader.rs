@@ -24,7 +24,7 @@ use crate::stages::containers::GltfContainers;
 /// Keys and values of a table.
 pub(super) type MitsubaEntries = Vec<(&'static str, BuiltValue)>;
 
-/// What a color is used for, which determines how spectra are converted.
+/// The use of a color. It determines how spectra are converted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum ColorRole {
     /// A reflectance or transmittance from 0 to 1.

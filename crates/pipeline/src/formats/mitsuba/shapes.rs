@@ -139,7 +139,7 @@ impl<'a> SceneReader<'a> {
         self.material(bsdf, emitter, uv, object)
     }
 
-    /// Reports flipped normals, which glimt ignores. In Mitsuba, mirroring transforms flip normals, too.
+    /// Reports flipped normals, which glimt ignores. In Mitsuba, mirroring transforms also flip normals.
     fn note_flipped_normals(&mut self, object: &'a PluginInstance) {
         let text = "the front is the usual side, which matters to one-sided materials, glass and lights";
         self.notes.substitute_light(

@@ -9,7 +9,7 @@ use crate::formats::rounding::{shorten as shorten_number, shorten_color};
 use crate::math::{DMat4, DVec3};
 use crate::scene::BuiltValue;
 
-/// What a texture is used for.
+/// The use of a texture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum MitsubaTextureUse {
     Color,

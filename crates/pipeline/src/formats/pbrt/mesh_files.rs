@@ -21,7 +21,7 @@ const SMALL_FILE_BYTES: u64 = 2048;
 /// Start of the message for a mesh without area.
 const NO_USABLE_FACE: &str = "no usable face";
 
-/// What a reader needs to know about a mesh file before it is loaded.
+/// Properties of a mesh file that are read before the file is loaded.
 struct MeshHeader {
     has_normals: bool,
     has_uvs: bool,

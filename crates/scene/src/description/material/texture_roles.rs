@@ -110,7 +110,7 @@ impl MaterialKind {
 
 impl Material {
     /// Returns the material's textures, as indices into [`Scene::textures`](super::super::Scene::textures) with
-    /// their roles, but not those of the parts of a blend. A texture may occur several times.
+    /// their roles. Textures of a blend's parts are excluded. A texture may occur several times.
     pub fn own_textures_with_roles(&self) -> Vec<(usize, TextureRole)> {
         let Self { name: _, kind, sides: _, emission, normal_map, bump, opacity, coat } = self;
         let coat = Some(coat).filter(|coat| coat.exists());

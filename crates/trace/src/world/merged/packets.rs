@@ -1,5 +1,5 @@
-//! Packets of rays against merged meshes: without the tree if the rays are incoherent and there are few
-//! triangles, and with the tree otherwise.
+//! Packets of rays against merged meshes. If the rays are incoherent and there are few triangles, all triangles
+//! are tested. In other cases, the tree is traversed.
 
 use super::MergedMeshes;
 use crate::accel::{F32x16, InstructionSet, PACKET_SIZE, SimdKernel};
