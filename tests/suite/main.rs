@@ -13,6 +13,7 @@ mod contract;
 mod docs;
 mod extremes;
 mod file_protection;
+mod foreign_scenes;
 mod fuzz;
 mod gltf;
 mod gltf_materials;

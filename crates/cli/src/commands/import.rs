@@ -49,6 +49,7 @@ fn convert_and_write(args: &ImportArgs, console: &Console, token: &CancelToken) 
         Err(ImportError::Work(message)) => return console.print_error(Exit::FAILED, &message),
     };
     report_approximations(&imported.substitutions, console);
+    console.print_diagnostics(&imported.notes);
     if args.foreign.strict && !imported.substitutions.is_empty() {
         let what = format_count(imported.substitutions.len() as u64, "approximation");
         return console.print_error(Exit::WRONG, &format!("{what} with --strict: nothing was written"));

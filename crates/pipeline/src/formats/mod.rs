@@ -121,6 +121,8 @@ pub struct ImportedScene {
     pub files: Vec<(PathBuf, Vec<u8>)>,
     /// Features without an exact equivalent and their substitutes.
     pub substitutions: Vec<Diagnostic>,
+    /// Definitions that differ.
+    pub notes: Vec<Diagnostic>,
 }
 
 /// Validates a document like a scene file, with the overrides from the command line.

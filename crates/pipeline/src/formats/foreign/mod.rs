@@ -1,6 +1,7 @@
 //! Functions shared by the readers of other renderers' scenes.
 
 mod cie;
+pub(crate) mod import;
 pub(crate) mod ior;
 pub(crate) mod notes;
 pub(crate) mod options;

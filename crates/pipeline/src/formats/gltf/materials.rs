@@ -8,6 +8,7 @@ use super::SceneBuilder;
 use crate::assets::gltf::{
     AlphaMode, DiffuseTransmission, ModelMaterial, TextureRef, TextureWrap, TexturedValue,
 };
+use crate::formats::foreign::import::TableEntries;
 use crate::math::{DVec3, Vec2};
 use crate::scene::BuiltValue;
 
@@ -27,9 +28,6 @@ enum TextureUse {
     Numbers,
     Normals,
 }
-
-/// Keys and values of a table.
-type Entries = Vec<(&'static str, BuiltValue)>;
 
 /// Identity of a texture: its image, its use and its other table keys, formatted.
 type TextureIdentity = (usize, TextureUse, String);
@@ -110,7 +108,7 @@ impl MaterialBuilder<'_, '_> {
 
     /// Adds a blend of two materials.
     fn add_blend(&mut self, name: &str, parts: [String; 2], weight: &TexturedValue, channel: &'static str) {
-        let mut keys = Entries::new();
+        let mut keys = TableEntries::new();
         self.push_number_or_texture(&mut keys, "weight", 0.5, weight, channel);
         let document = &mut self.scene.document;
         document.start_named_table("materials", name);
@@ -122,7 +120,7 @@ impl MaterialBuilder<'_, '_> {
     /// Adds a material, which transmits diffuse light of the color `transmitted`.
     fn add_material(&mut self, material: &ModelMaterial, name: &str, transmitted: Option<&TexturedValue>) {
         // Collect the keys first, because texture tables must precede the material's table.
-        let mut keys = Entries::new();
+        let mut keys = TableEntries::new();
         match material.glass {
             Some(glass) => {
                 keys.push(("type", "glass".into()));
@@ -147,7 +145,7 @@ impl MaterialBuilder<'_, '_> {
         keys.into_iter().for_each(|(key, value)| document.set(key, value));
     }
 
-    fn add_principled_keys(&mut self, keys: &mut Entries, material: &ModelMaterial) {
+    fn add_principled_keys(&mut self, keys: &mut TableEntries, material: &ModelMaterial) {
         keys.push(("type", "principled".into()));
         self.push_color_or_texture(keys, "color", 0.8, &material.color);
         self.push_number_or_texture(keys, "metallic", 0.0, &material.metallic, "b");
@@ -162,7 +160,7 @@ impl MaterialBuilder<'_, '_> {
     }
 
     /// Adds the keys that all material types share.
-    fn add_common_keys(&mut self, keys: &mut Entries, material: &ModelMaterial) {
+    fn add_common_keys(&mut self, keys: &mut TableEntries, material: &ModelMaterial) {
         let emission = &material.emission;
         if emission.factor != DVec3::ZERO {
             match &emission.texture {
@@ -203,7 +201,7 @@ impl MaterialBuilder<'_, '_> {
     }
 
     /// Adds the opacity, reading it from the texture's alpha channel if there is a texture.
-    fn add_opacity(&mut self, keys: &mut Entries, value: &TexturedValue, color: &TexturedValue) {
+    fn add_opacity(&mut self, keys: &mut TableEntries, value: &TexturedValue, color: &TexturedValue) {
         match &value.texture {
             Some(texture) => {
                 // Without factors, color and alpha can share a texture table.
@@ -223,7 +221,7 @@ impl MaterialBuilder<'_, '_> {
 
     fn push_color_or_texture(
         &mut self,
-        keys: &mut Entries,
+        keys: &mut TableEntries,
         key: &'static str,
         usual: f64,
         slot: &TexturedValue,
@@ -243,7 +241,7 @@ impl MaterialBuilder<'_, '_> {
 
     fn push_number_or_texture(
         &mut self,
-        keys: &mut Entries,
+        keys: &mut TableEntries,
         key: &'static str,
         usual: f64,
         slot: &TexturedValue,
@@ -261,7 +259,7 @@ impl MaterialBuilder<'_, '_> {
 
     /// Returns a texture's name, adding its table if the texture is new.
     fn ensure_texture_table(&mut self, texture: &TextureRef, use_: TextureUse, factor: DVec3) -> String {
-        let mut keys = Entries::new();
+        let mut keys = TableEntries::new();
         if texture.is_nearest {
             keys.push(("filter", "nearest".into()));
         }

@@ -83,7 +83,7 @@ pub(super) fn convert(
         Ok((PathBuf::from(name), bytes))
     };
     let files = assets.into_iter().map(encode).collect::<Result<_, AssetError>>()?;
-    Ok(ImportedScene { document, files, substitutions })
+    Ok(ImportedScene { document, files, substitutions, notes: Vec::new() })
 }
 
 /// Rejects a file that `glimt check` would reject. Checks the scene that `glimt MODEL` would render instead of

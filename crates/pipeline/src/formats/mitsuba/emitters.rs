@@ -3,10 +3,11 @@
 use std::f64::consts::PI;
 
 use super::graph::PluginInstance;
-use super::reader::{ColorRole, ColorSource, MitsubaEntries, SceneReader};
+use super::reader::{ColorRole, ColorSource, SceneReader};
 use super::settings::span_of;
 use super::textures::extension;
 use super::xml::shorten;
+use crate::formats::foreign::import::TableEntries;
 use crate::formats::foreign::transform::linear_part;
 use crate::formats::rounding::{shorten as shorten_number, shorten_color};
 use crate::math::{DMat3, DMat4, DVec3};
@@ -275,7 +276,7 @@ impl<'a> SceneReader<'a> {
         if !(1.0..=10.0).contains(&turbidity) {
             return self.error(span_of(object, "turbidity"), "`turbidity` must be between 1 and 10", None);
         }
-        let mut sky: MitsubaEntries = vec![
+        let mut sky: TableEntries = vec![
             ("sun", local.into()),
             ("turbidity", shorten_number(turbidity).into()),
             ("ground", shorten_color(ground)),

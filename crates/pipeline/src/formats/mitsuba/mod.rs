@@ -28,13 +28,11 @@ use self::reader::SceneReader;
 use self::shapes::ShapeTarget;
 use self::xml::XmlLoader;
 use super::foreign::ForeignError;
+use super::foreign::import::{CopiedFile, check_scene_before_import, read_copied_files};
 use super::model::file_name;
-use super::{ForeignReadContext, ForeignScene, ImportedScene, scene_from_document};
+use super::{ForeignReadContext, ForeignScene, ImportedScene};
 use crate::assets::Companion;
 use crate::scene::diagnostic::{Diagnostic, Severity};
-
-/// Files that an import copies: their paths, and their names relative to the scene.
-type CopiedFiles = Vec<(PathBuf, String)>;
 
 /// Reads a scene.
 pub(super) fn read(path: &Path, context: &ForeignReadContext<'_>) -> Result<ForeignScene, ForeignError> {
@@ -47,26 +45,11 @@ pub(super) fn convert(
     folder: &str,
     context: &ForeignReadContext<'_>,
 ) -> Result<ImportedScene, ForeignError> {
-    let (ForeignScene { document, notes, substitutions, companions, .. }, files) =
+    check_scene_before_import(read(path, context)?, path)?;
+    let (ForeignScene { document, notes, substitutions, .. }, copies) =
         read_scene(path, Some(folder), context)?;
-    // Check the scene with its files in place, because the copies do not exist yet.
-    let (in_place, _) = read_scene(path, None, context)?;
-    let errors = scene_from_document(in_place.document, path, &[]).err().unwrap_or_default();
-    if errors.iter().any(|error| error.severity == Severity::Error) {
-        return Err(ForeignError::Scene { diagnostics: errors, companions });
-    }
-    let copy = |(source, name): (PathBuf, String)| {
-        context.token.check_pause_and_cancel()?;
-        let bytes = std::fs::read(&source).map_err(|error| {
-            let message = format!("cannot read it: {error}");
-            let diagnostics = vec![Diagnostic::about_file(&source, Severity::Error, message)];
-            ForeignError::Scene { diagnostics, companions: Vec::new() }
-        })?;
-        Ok((PathBuf::from(name), bytes))
-    };
-    let files = files.into_iter().map(copy).collect::<Result<Vec<_>, ForeignError>>()?;
-    let substitutions = substitutions.into_iter().chain(notes).collect();
-    Ok(ImportedScene { document, files, substitutions })
+    let files = read_copied_files(copies, context.token)?;
+    Ok(ImportedScene { document, files, substitutions, notes })
 }
 
 /// Reads a scene. With a folder, the scene refers to copies of its assets, which are also returned.
@@ -74,7 +57,7 @@ fn read_scene(
     path: &Path,
     asset_folder: Option<&str>,
     context: &ForeignReadContext<'_>,
-) -> Result<(ForeignScene, CopiedFiles), ForeignError> {
+) -> Result<(ForeignScene, Vec<CopiedFile>), ForeignError> {
     let ForeignReadContext { options, token, .. } = *context;
     let mut loader = XmlLoader::new(path, &options.defines, token);
     let root = loader.load_scene(path)?;
@@ -127,6 +110,6 @@ fn read_scene(
     let (notes, substitutions) = notes.into_diagnostics(&sources.files);
     let (hash, files) = (sources.hash, sources.files);
     document.attach_files(files);
-    let copied = asset_names.into_iter().collect();
+    let copied = asset_names.into_iter().map(|(source, name)| CopiedFile { name, source }).collect();
     Ok((ForeignScene { document, hash, companions, notes, substitutions }, copied))
 }

@@ -12,6 +12,7 @@ use super::xml::{MAX_ERRORS, shorten};
 use crate::assets::Companion;
 use crate::control::CancelToken;
 use crate::formats::ForeignReadContext;
+use crate::formats::foreign::import::TableEntries;
 use crate::formats::foreign::notes::NoteCollector;
 use crate::formats::foreign::options::ForeignOptions;
 use crate::formats::model::UsedNames;
@@ -20,9 +21,6 @@ use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::nearest::nearest_name;
 use crate::scene::{BuiltValue, SceneDocumentBuilder, SourceFiles};
 use crate::stages::containers::GltfContainers;
-
-/// Keys and values of a table.
-pub(super) type MitsubaEntries = Vec<(&'static str, BuiltValue)>;
 
 /// The use of a color. It determines how spectra are converted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -260,7 +258,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Adds the entries to the current table.
-    pub(super) fn set_all(&mut self, entries: MitsubaEntries) {
+    pub(super) fn set_all(&mut self, entries: TableEntries) {
         for (key, value) in entries {
             self.document.set(key, value);
         }

@@ -2,9 +2,10 @@
 
 use super::graph::{ObjectIndex, ObjectKind, PluginInstance};
 use super::material_key::UvConvention;
-use super::reader::{ColorRole, ColorSource, MitsubaEntries, SceneReader, luminance};
+use super::reader::{ColorRole, ColorSource, SceneReader, luminance};
 use super::settings::span_of;
 use super::xml::shorten;
+use crate::formats::foreign::import::TableEntries;
 use crate::formats::rounding::{shorten as shorten_number, shorten_color};
 use crate::math::{DMat4, DVec3};
 use crate::scene::BuiltValue;
@@ -50,14 +51,14 @@ impl UvMap {
     }
 
     /// Returns the keys `repeat`, `rotate` and `offset`, or `None` if the map shears or is degenerate.
-    fn keys(&self) -> Option<MitsubaEntries> {
+    fn keys(&self) -> Option<TableEntries> {
         let [[a, b], [c, d]] = self.rows;
         let (first, second) = (libm::hypot(a, c), libm::hypot(b, d));
         let is_valid = first > 1e-12 && second > 1e-12 && first.is_finite() && second.is_finite();
         if !is_valid || (a * b + c * d).abs() > 1e-6 * first * second {
             return None;
         }
-        let mut keys = MitsubaEntries::new();
+        let mut keys = TableEntries::new();
         let (repeat, angle) = if b.abs() <= 1e-9 * second && c.abs() <= 1e-9 * first {
             ([a, d], 0.0)
         } else {
@@ -216,7 +217,7 @@ impl<'a> SceneReader<'a> {
         object: &'a PluginInstance,
         usage: MitsubaTextureUse,
         uv: UvConvention,
-    ) -> Option<(MitsubaEntries, String)> {
+    ) -> Option<(TableEntries, String)> {
         let Some((name, span)) = self.text(object, "filename") else {
             self.error(object.span.clone(), "the texture needs `filename`", None);
             return None;
@@ -227,7 +228,7 @@ impl<'a> SceneReader<'a> {
             self.error(span, format!("glimt cannot read .{} images", shorten(&kind)), Some(help));
             return None;
         }
-        let mut keys: MitsubaEntries = vec![("file", self.asset(name, &span, "image")?.into())];
+        let mut keys: TableEntries = vec![("file", self.asset(name, &span, "image")?.into())];
         match self.text(object, "filter_type") {
             None | Some(("bilinear" | "trilinear" | "ewa", _)) => {}
             Some(("nearest", _)) => keys.push(("filter", "nearest".into())),
@@ -272,7 +273,7 @@ impl<'a> SceneReader<'a> {
         Some((keys, stem.to_owned()))
     }
 
-    fn uv_keys(&mut self, object: &'a PluginInstance, uv: UvConvention, is_image: bool) -> MitsubaEntries {
+    fn uv_keys(&mut self, object: &'a PluginInstance, uv: UvConvention, is_image: bool) -> TableEntries {
         let to_uv =
             self.transform_value(object, "to_uv").map_or(DMat4::IDENTITY, |transform| transform.matrix);
         let keys = UvMap::new(&to_uv, uv, is_image).keys();
@@ -305,7 +306,7 @@ impl<'a> SceneReader<'a> {
         object: &'a PluginInstance,
         usage: MitsubaTextureUse,
         uv: UvConvention,
-    ) -> Option<MitsubaEntries> {
+    ) -> Option<TableEntries> {
         let mut colors = self.checker_colors(object);
         match usage {
             MitsubaTextureUse::Color => {}
@@ -324,10 +325,9 @@ impl<'a> SceneReader<'a> {
         object: &'a PluginInstance,
         colors: [DVec3; 2],
         uv: UvConvention,
-    ) -> MitsubaEntries {
+    ) -> TableEntries {
         let colors = colors.map(shorten_color).to_vec();
-        let mut keys: MitsubaEntries =
-            vec![("type", "checker".into()), ("colors", BuiltValue::Array(colors))];
+        let mut keys: TableEntries = vec![("type", "checker".into()), ("colors", BuiltValue::Array(colors))];
         keys.extend(self.uv_keys(object, uv, false));
         keys
     }

@@ -10,10 +10,11 @@ use super::memo;
 use super::pixels::Pixels;
 use super::scene::SceneWriter;
 use super::texture_nodes::{ImageFilter, ImageNode, ImageWrap, TextureNode, UvMapping};
-use super::textures::{PbrtEntries, PbrtTextureUse, push_mapping};
+use super::textures::{PbrtTextureUse, push_mapping};
 use crate::assets::image::{ColorEncoding, ColorTransferFunction, ImageLimits, load_and_hash};
 use crate::assets::{AssetError, Companion};
 use crate::control::ignore_progress;
+use crate::formats::foreign::import::TableEntries;
 use crate::materials::texels::Texels;
 use crate::math::color::luminance;
 use crate::math::{DVec2, DVec3, Vec3};
@@ -79,7 +80,7 @@ impl SceneWriter<'_> {
     }
 
     /// Returns the keys of a computed image, and its name.
-    pub(super) fn baked_keys(&mut self, node: &TextureNode, usage: PbrtTextureUse) -> (PbrtEntries, String) {
+    pub(super) fn baked_keys(&mut self, node: &TextureNode, usage: PbrtTextureUse) -> (TableEntries, String) {
         let mut leaves = Vec::new();
         collect_leaves(node, &mut leaves);
         let mut images = Images::new();
@@ -108,7 +109,7 @@ impl SceneWriter<'_> {
         });
         let name = name.unwrap_or_else(|| "texture".to_owned());
         let file = self.add_generated_file(&name, "pfm", pixels.encode_pfm(is_number));
-        let mut keys: PbrtEntries = vec![("file", file.into())];
+        let mut keys: TableEntries = vec![("file", file.into())];
         if domain.wrap == ImageWrap::Clamp {
             keys.push(("wrap", "clamp".into()));
         }

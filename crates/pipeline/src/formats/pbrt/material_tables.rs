@@ -5,7 +5,8 @@ use super::materials::{BlendPart, MaterialModel};
 use super::scene::{LoweredMaterial, SceneWriter};
 use super::state::{Entity, MaterialReference};
 use super::texture_nodes::TextureNode;
-use super::textures::{PbrtEntries, PbrtTextureUse, texture_value};
+use super::textures::{PbrtTextureUse, texture_value};
+use crate::formats::foreign::import::TableEntries;
 use crate::formats::rounding::shorten_color;
 use crate::math::DVec3;
 use crate::scene::BuiltValue;
@@ -124,7 +125,7 @@ impl SceneWriter<'_> {
         }
         let span = 0..0;
         self.notes.substitute("a light with the material `interface`", "its surface is black", span.clone());
-        let mut keys: PbrtEntries = vec![("diffuse", 0.0.into())];
+        let mut keys: TableEntries = vec![("diffuse", 0.0.into())];
         let needs_uv = self.push_shape_keys(&mut keys, properties, false);
         let name = self.add_material_table(keys, name, &span);
         LoweredMaterial::Table { name, needs_uv, has_inside: false }
@@ -183,7 +184,7 @@ impl SceneWriter<'_> {
     /// Adds the keys of a shape's properties. Returns whether an image is used.
     fn push_shape_keys(
         &mut self,
-        keys: &mut PbrtEntries,
+        keys: &mut TableEntries,
         properties: &ShapeProperties,
         is_glass: bool,
     ) -> bool {
@@ -220,7 +221,7 @@ impl SceneWriter<'_> {
         uses_image
     }
 
-    fn add_material_table(&mut self, keys: PbrtEntries, wanted: &str, span: &Range<usize>) -> String {
+    fn add_material_table(&mut self, keys: TableEntries, wanted: &str, span: &Range<usize>) -> String {
         let name = self.material_names.make_unique(wanted, "material");
         self.document.set_span_for_next_values(span.clone());
         self.document.start_named_table("materials", &name);

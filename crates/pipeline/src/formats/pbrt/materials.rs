@@ -6,7 +6,8 @@ use super::parameters::{Parameters, Text};
 use super::scene::SceneWriter;
 use super::state::{ColorSpace, Entity};
 use super::texture_nodes::{ImageFilter, ImageNode, ImageWrap, TextureNode, TextureValue, UvMapping};
-use super::textures::{PbrtEntries, PbrtTextureUse};
+use super::textures::PbrtTextureUse;
+use crate::formats::foreign::import::TableEntries;
 use crate::formats::rounding::shorten_color;
 use crate::materials::conductor::elements::NamedConductor;
 use crate::math::{DVec3, Vec3};
@@ -24,7 +25,7 @@ pub(super) struct BlendPart {
 /// A material without the properties of shapes.
 pub(super) enum MaterialModel {
     Plain {
-        keys: PbrtEntries,
+        keys: TableEntries,
         /// Whether it uses texture coordinates or tangents.
         needs_uv: bool,
         /// Whether it is solid glass.
@@ -75,7 +76,7 @@ struct MaterialReader<'w, 'a> {
     writer: &'w mut SceneWriter<'a>,
     parameters: &'w Parameters,
     space: ColorSpace,
-    keys: PbrtEntries,
+    keys: TableEntries,
     needs_uv: bool,
 }
 

@@ -37,8 +37,9 @@ use self::parser::Parser;
 use self::scene::{AssetLocation, SceneWriter};
 use self::texture_nodes::TextureResolver;
 use super::foreign::ForeignError;
+use super::foreign::import::{CopiedFile, check_scene_before_import, read_copied_files};
 use super::foreign::sources::SourceReader;
-use super::{ForeignReadContext, ForeignScene, ImportedScene, scene_from_document};
+use super::{ForeignReadContext, ForeignScene, ImportedScene};
 use crate::assets::{AssetError, Companion};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::{SceneDocumentBuilder, SourceFiles};
@@ -54,27 +55,13 @@ pub(super) fn convert(
     folder: &str,
     context: &ForeignReadContext<'_>,
 ) -> Result<ImportedScene, ForeignError> {
-    check_rendered_scene(path, context)?;
-    let (ForeignScene { document, substitutions, .. }, copies) = read_scene(path, Some(folder), context)?;
-    let mut files: Vec<(PathBuf, Vec<u8>)> = Vec::new();
-    for (name, source) in copies {
-        context.token.check_pause_and_cancel()?;
-        let bytes = std::fs::read(&source).map_err(|error| {
-            AssetError::malformed(&source, None, format!("cannot read the file: {error}"))
-        })?;
-        files.push((PathBuf::from(name), bytes));
-    }
+    check_scene_before_import(read(path, context)?, path)?;
+    let (ForeignScene { document, notes, substitutions, .. }, copies) =
+        read_scene(path, Some(folder), context)?;
+    let mut files = read_copied_files(copies, context.token)?;
     let generated = document.generated_files().iter();
     files.extend(generated.map(|(name, file)| (PathBuf::from(name), file.bytes.to_vec())));
-    Ok(ImportedScene { document, files, substitutions })
-}
-
-/// Rejects a scene that `glimt check` would reject.
-fn check_rendered_scene(path: &Path, context: &ForeignReadContext<'_>) -> Result<(), ForeignError> {
-    let ForeignScene { document, companions, .. } = read(path, context)?;
-    scene_from_document(document, path, &[])
-        .map(|_| ())
-        .map_err(|diagnostics| ForeignError::Scene { diagnostics, companions })
+    Ok(ImportedScene { document, files, substitutions, notes })
 }
 
 /// Reads a scene. `import` is the folder for the assets of an imported scene. Also returns the files to copy

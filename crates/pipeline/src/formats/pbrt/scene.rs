@@ -11,6 +11,7 @@ use super::state::{MaterialReference, Statements};
 use super::texture_nodes::TextureResolver;
 use crate::assets::Companion;
 use crate::control::CancelToken;
+use crate::formats::foreign::import::CopiedFile;
 use crate::formats::foreign::notes::NoteCollector;
 use crate::formats::foreign::{ForeignOptions, MissingAssetMode};
 use crate::formats::model::UsedNames;
@@ -30,8 +31,8 @@ pub(super) struct AssetLocation<'a> {
     /// Folder next to the imported scene into which `glimt import` copies all files. `None` if the files stay
     /// where they are.
     pub(super) import: Option<&'a str>,
-    /// Files to copy: names relative to the scene, and paths.
-    pub(super) copies: Vec<(String, PathBuf)>,
+    /// Files to copy.
+    pub(super) copies: Vec<CopiedFile>,
     names: UsedNames,
     known: HashMap<PathBuf, String>,
 }
@@ -53,7 +54,7 @@ impl<'a> AssetLocation<'a> {
         let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
         let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let name = self.unique_name(folder, &stem, &extension);
-        self.copies.push((name.clone(), path.clone()));
+        self.copies.push(CopiedFile { name: name.clone(), source: path.clone() });
         self.known.insert(path, name.clone());
         name
     }

@@ -4,12 +4,10 @@ use std::sync::Arc;
 
 use super::scene::SceneWriter;
 use super::texture_nodes::{ImageFilter, ImageNode, ImageWrap, TextureNode, UvMapping};
+use crate::formats::foreign::import::TableEntries;
 use crate::formats::rounding::shorten_color;
 use crate::math::DVec3;
 use crate::scene::BuiltValue;
-
-/// Keys and values of a table.
-pub(super) type PbrtEntries = Vec<(&'static str, BuiltValue)>;
 
 /// The values of a texture that are used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -98,7 +96,7 @@ impl SceneWriter<'_> {
     }
 
     /// Adds a table unless an equal one exists, and returns its name.
-    pub(super) fn add_texture_table(&mut self, keys: PbrtEntries, wanted: &str) -> String {
+    pub(super) fn add_texture_table(&mut self, keys: TableEntries, wanted: &str) -> String {
         let identity = format!("{keys:?}");
         if let Some(known) = self.textures.get(&identity) {
             return known.clone();
@@ -126,8 +124,8 @@ impl SceneWriter<'_> {
         }
     }
 
-    fn image_keys(&mut self, image: &ImageNode, usage: PbrtTextureUse) -> PbrtEntries {
-        let mut keys: PbrtEntries = vec![("file", self.asset_name(&image.file).into())];
+    fn image_keys(&mut self, image: &ImageNode, usage: PbrtTextureUse) -> TableEntries {
+        let mut keys: TableEntries = vec![("file", self.asset_name(&image.file).into())];
         match image.wrap {
             ImageWrap::Repeat | ImageWrap::Black => {}
             ImageWrap::Clamp => keys.push(("wrap", "clamp".into())),
@@ -175,7 +173,7 @@ fn file_stem(file: &str) -> String {
 }
 
 /// Adds `repeat` and `offset`. `cells` is the number of pbrt's units per repetition.
-pub(super) fn push_mapping(keys: &mut PbrtEntries, mapping: UvMapping, cells: f64) {
+pub(super) fn push_mapping(keys: &mut TableEntries, mapping: UvMapping, cells: f64) {
     let UvMapping { scale, offset } = mapping;
     if scale / cells != crate::math::DVec2::ONE {
         keys.push(("repeat", (scale / cells).to_array().into()));
@@ -186,16 +184,16 @@ pub(super) fn push_mapping(keys: &mut PbrtEntries, mapping: UvMapping, cells: f6
 }
 
 /// glimt's checkers have two cells per repetition.
-fn checker_keys(mapping: UvMapping, colors: [DVec3; 2]) -> PbrtEntries {
+fn checker_keys(mapping: UvMapping, colors: [DVec3; 2]) -> TableEntries {
     let colors = colors.map(|color| color.max(DVec3::ZERO)).map(shorten_color).to_vec();
-    let mut keys: PbrtEntries =
+    let mut keys: TableEntries =
         vec![("type", "checker".into()), ("colors", BuiltValue::Array(colors)), ("filter", "mipmap".into())];
     push_mapping(&mut keys, mapping, 2.0);
     keys
 }
 
 /// Noise from 0 to `factor`.
-fn noise_keys(octaves: u32, factor: f64) -> PbrtEntries {
+fn noise_keys(octaves: u32, factor: f64) -> TableEntries {
     let colors = BuiltValue::Array(vec![0.0.into(), factor.abs().into()]);
     vec![("type", "noise".into()), ("colors", colors), ("octaves", f64::from(octaves).into())]
 }

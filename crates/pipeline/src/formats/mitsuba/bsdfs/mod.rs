@@ -5,8 +5,9 @@ mod surfaces;
 
 use super::graph::{Child, ObjectIndex, ObjectKind, PluginInstance};
 use super::material_key::{MaterialKey, UvConvention};
-use super::reader::{ColorRole, ColorSource, MitsubaEntries, NumberSource, SceneReader, luminance};
+use super::reader::{ColorRole, ColorSource, NumberSource, SceneReader, luminance};
 use super::textures::MitsubaTextureUse;
+use crate::formats::foreign::import::TableEntries;
 use crate::formats::rounding::{shorten as shorten_number, shorten_color};
 use crate::math::DVec3;
 use crate::scene::BuiltValue;
@@ -61,7 +62,7 @@ pub(super) struct BsdfContext {
 #[derive(Debug, Default)]
 pub(super) struct MaterialBuilder {
     /// The keys, including `type`.
-    keys: MitsubaEntries,
+    keys: TableEntries,
     /// Whether the surface is an index-matched boundary that has no effect.
     is_invisible: bool,
     /// Whether the material transmits light as glass.
@@ -74,13 +75,13 @@ pub(super) struct MaterialBuilder {
 }
 
 impl MaterialBuilder {
-    fn new(kind: &'static str, keys: MitsubaEntries) -> Self {
+    fn new(kind: &'static str, keys: TableEntries) -> Self {
         let keys = std::iter::once(("type", kind.into())).chain(keys).collect();
         Self { keys, ..Self::default() }
     }
 
     /// A material whose back is black unless a `twosided` contains it.
-    fn one_sided(kind: &'static str, keys: MitsubaEntries) -> Self {
+    fn one_sided(kind: &'static str, keys: TableEntries) -> Self {
         Self { is_one_sided: true, ..Self::new(kind, keys) }
     }
 

@@ -1,9 +1,10 @@
 //! Converts BSDFs that contain other BSDFs.
 
 use super::{BsdfContext, MaterialBuilder};
+use crate::formats::foreign::import::TableEntries;
 use crate::formats::mitsuba::graph::{Child, ObjectIndex, ObjectKind, PluginInstance};
 use crate::formats::mitsuba::property::PropertyValue;
-use crate::formats::mitsuba::reader::{ColorRole, ColorSource, MitsubaEntries, NumberSource, SceneReader};
+use crate::formats::mitsuba::reader::{ColorRole, ColorSource, NumberSource, SceneReader};
 use crate::formats::mitsuba::textures::MitsubaTextureUse;
 use crate::formats::mitsuba::xml::shorten;
 use crate::formats::rounding::{shorten as shorten_number, shorten_color};
@@ -162,7 +163,7 @@ impl<'a> SceneReader<'a> {
         self.ignored_scale(object, "specular_reflectance");
         let roughness = match object.plugin.as_str() {
             "roughcoating" => {
-                let mut keys = MitsubaEntries::new();
+                let mut keys = TableEntries::new();
                 self.add_distribution(&mut keys, object, 0.1, context, false);
                 keys.into_iter().find(|(key, _)| *key == "roughness").map_or(0.3.into(), |(_, value)| value)
             }

@@ -2,14 +2,13 @@
 
 use super::{AIR, BsdfContext, MaterialBuilder};
 use crate::choice::Choice;
+use crate::formats::foreign::import::TableEntries;
 use crate::formats::foreign::ior::{dielectric_ior, dielectric_names};
 use crate::formats::foreign::spectra::flat_emission_color;
 use crate::formats::mitsuba::graph::PluginInstance;
 use crate::formats::mitsuba::plastic::{PlasticCoat, remapped_reflectance};
 use crate::formats::mitsuba::property::PropertyValue;
-use crate::formats::mitsuba::reader::{
-    ColorRole, ColorSource, MitsubaEntries, NumberSource, SceneReader, luminance,
-};
+use crate::formats::mitsuba::reader::{ColorRole, ColorSource, NumberSource, SceneReader, luminance};
 use crate::formats::mitsuba::settings::span_of;
 use crate::formats::mitsuba::xml::shorten;
 use crate::formats::rounding::{shorten as shorten_number, shorten_color, shorten_vector};
@@ -73,7 +72,7 @@ impl<'a> SceneReader<'a> {
     /// Adds the keys of a microfacet distribution: `roughness`, `anisotropy` and `distribution`.
     pub(super) fn add_distribution(
         &mut self,
-        keys: &mut MitsubaEntries,
+        keys: &mut TableEntries,
         object: &'a PluginInstance,
         default_alpha: f64,
         context: BsdfContext,
@@ -184,7 +183,7 @@ impl<'a> SceneReader<'a> {
             self.add_distribution(&mut keys, object, 0.1, context, true);
             return Some(MaterialBuilder::one_sided("metal", keys));
         }
-        let mut keys = MitsubaEntries::new();
+        let mut keys = TableEntries::new();
         if has_eta {
             let eta = self.color(object, "eta", ColorRole::Unbounded, 0.0);
             let k = self.color(object, "k", ColorRole::Unbounded, 1.0);
@@ -285,7 +284,7 @@ impl<'a> SceneReader<'a> {
 
     pub(super) fn dielectric(&mut self, object: &'a PluginInstance, context: BsdfContext) -> MaterialBuilder {
         let ior = self.relative_ior(object, 1.5046);
-        let mut keys: MitsubaEntries = vec![("ior", shorten_number(ior).into())];
+        let mut keys: TableEntries = vec![("ior", shorten_number(ior).into())];
         self.ignored_scale(object, "specular_reflectance");
         match object.plugin.as_str() {
             "thindielectric" => {
@@ -308,9 +307,9 @@ impl<'a> SceneReader<'a> {
     pub(super) fn plastic(&mut self, object: &'a PluginInstance, context: BsdfContext) -> MaterialBuilder {
         let ior = self.relative_ior(object, 1.49).max(1.0);
         let is_nonlinear = self.boolean(object, "nonlinear", false);
-        let mut keys: MitsubaEntries = vec![("ior", shorten_number(ior).into())];
+        let mut keys: TableEntries = vec![("ior", shorten_number(ior).into())];
         let alpha = if object.plugin == "roughplastic" {
-            let (mut distribution, mut alpha) = (MitsubaEntries::new(), 0.1);
+            let (mut distribution, mut alpha) = (TableEntries::new(), 0.1);
             if let NumberSource::Constant(constant) = self.number(object, "alpha", 0.1) {
                 alpha = constant.clamp(1e-4, 1.0);
             }
@@ -395,7 +394,7 @@ impl<'a> SceneReader<'a> {
     }
 
     pub(super) fn principled(&mut self, object: &'a PluginInstance, context: BsdfContext) -> MaterialBuilder {
-        let mut keys: MitsubaEntries = vec![("color", self.reflectance(object, "base_color", 0.5, context))];
+        let mut keys: TableEntries = vec![("color", self.reflectance(object, "base_color", 0.5, context))];
         for (name, key, default) in
             [("metallic", "metallic", 0.0), ("roughness", "roughness", 0.5), ("clearcoat", "clearcoat", 0.0)]
         {

@@ -1,0 +1,43 @@
+//! Steps of `glimt import` that scenes of all other renderers share.
+
+use std::path::{Path, PathBuf};
+
+use super::super::{ForeignScene, scene_from_document};
+use super::ForeignError;
+use crate::assets::AssetError;
+use crate::control::CancelToken;
+use crate::scene::BuiltValue;
+
+/// Keys and values of a table.
+pub(crate) type TableEntries = Vec<(&'static str, BuiltValue)>;
+
+/// A file that an import copies.
+#[derive(Clone, Debug)]
+pub(crate) struct CopiedFile {
+    /// Path relative to the new scene.
+    pub(crate) name: String,
+    /// The file to copy.
+    pub(crate) source: PathBuf,
+}
+
+/// Rejects a scene that `glimt check` would reject. `scene` must refer to its files where they are now, because
+/// the copies do not exist yet.
+pub(crate) fn check_scene_before_import(scene: ForeignScene, path: &Path) -> Result<(), ForeignError> {
+    let ForeignScene { document, companions, .. } = scene;
+    scene_from_document(document, path, &[])
+        .map(|_| ())
+        .map_err(|diagnostics| ForeignError::Scene { diagnostics, companions })
+}
+
+/// Reads the files to copy. Returns their names and contents.
+pub(crate) fn read_copied_files(
+    copies: Vec<CopiedFile>,
+    token: &CancelToken,
+) -> Result<Vec<(PathBuf, Vec<u8>)>, AssetError> {
+    let read = |copy: CopiedFile| {
+        token.check_pause_and_cancel()?;
+        let bytes = std::fs::read(&copy.source).map_err(|error| AssetError::from_io(&copy.source, &error))?;
+        Ok((PathBuf::from(copy.name), bytes))
+    };
+    copies.into_iter().map(read).collect()
+}

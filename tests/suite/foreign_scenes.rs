@@ -1,0 +1,36 @@
+//! Notes and substitutions of scenes of other renderers.
+
+use super::test_dir::{TestDir, assert_mentions};
+
+/// A Mitsuba scene whose integrator contains `settings`.
+fn mitsuba(integrator: &str, settings: &str) -> String {
+    format!(
+        r#"<scene version="3.0.0">
+    <integrator type="{integrator}">{settings}</integrator>
+    <sensor type="perspective"><film type="hdrfilm"><rfilter type="box"/></film></sensor>
+    <emitter type="constant"/>
+    <shape type="sphere"><point name="center" x="0" y="0" z="5"/></shape>
+</scene>"#
+    )
+}
+
+#[test]
+fn strict_import_rejects_only_substitutions() {
+    let note = mitsuba("direct", r#"<integer name="emitter_samples" value="4"/>"#);
+    let substitution = mitsuba("path", r#"<boolean name="hide_emitters" value="true"/>"#);
+    let spot = "Camera \"perspective\"\nWorldBegin\nLightSource \"spot\"\n\
+        Translate 0 0 5\nShape \"sphere\"\n";
+    for (file, text, word) in [("a.xml", note.as_str(), "once per emitter sample"), ("b.pbrt", spot, "spot")]
+    {
+        let dir = TestDir::new();
+        dir.write(file, text);
+        let said = dir.expect(&format!("import {file} -o scene.toml --strict"), 0);
+        assert_mentions(&said, &["note", word]);
+        assert!(dir.path("scene.toml").exists(), "{file}");
+    }
+    let dir = TestDir::new();
+    dir.write("a.xml", substitution);
+    let said = dir.expect("import a.xml -o scene.toml --strict", 2);
+    assert_mentions(&said, &["hide_emitters", "nothing was written"]);
+    assert!(!dir.path("scene.toml").exists());
+}
