@@ -47,7 +47,7 @@ pub struct SceneSummary {
 /// # Errors
 /// Returns all errors and warnings for the scene and its files.
 pub fn check_scene(path: &Path, sets: &[String]) -> Result<SceneSummary, Failure> {
-    check_scene_with_options(path, sets, &ForeignOptions::default())
+    check_scene_with_options(path, sets, &ForeignOptions::default(), &CancelToken::new())
 }
 
 /// Like [`check_scene`], with options for the scenes of other renderers.
@@ -58,9 +58,10 @@ pub fn check_scene_with_options(
     path: &Path,
     sets: &[String],
     foreign: &ForeignOptions,
+    token: &CancelToken,
 ) -> Result<SceneSummary, Failure> {
     let mut checker = IncrementalSceneChecker { foreign: foreign.clone(), ..Default::default() };
-    checker.check(path, sets, &CancelToken::new())
+    checker.check(path, sets, token)
 }
 
 /// Checks scenes repeatedly, rereading only files that have changed.

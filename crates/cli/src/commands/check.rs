@@ -6,6 +6,7 @@ use serde_json::{Value, json};
 
 use crate::commands::info::report_image_instead_of_scene;
 use crate::console::Console;
+use crate::control::CancelToken;
 use crate::diagnostic_json::diagnostic_to_json;
 use crate::exit::Exit;
 use crate::output::json::to_line_without_newline;
@@ -27,7 +28,7 @@ pub(crate) fn run(
     if let Some(exit) = report_image_instead_of_scene(scene, false, console) {
         return exit;
     }
-    match check_scene_with_options(scene, sets, foreign) {
+    match check_scene_with_options(scene, sets, foreign, &CancelToken::new()) {
         Ok(checked) => {
             console.print_diagnostics(&checked.warnings);
             console.print_line(&format_scene_counts(scene, &checked));
@@ -43,7 +44,7 @@ pub(crate) fn run(
 
 /// Reports the result as one JSON object on stdout.
 fn check_and_print_json(scene: &Path, sets: &[String], foreign: &ForeignOptions, console: &Console) -> Exit {
-    let (exit, diagnostics) = match check_scene_with_options(scene, sets, foreign) {
+    let (exit, diagnostics) = match check_scene_with_options(scene, sets, foreign, &CancelToken::new()) {
         Ok(checked) => (Exit::DONE, checked.warnings),
         Err(Failure::Scene(diagnostics)) => (Exit::WRONG, diagnostics),
         Err(Failure::Work(message)) => return console.print_error(Exit::FAILED, &message),

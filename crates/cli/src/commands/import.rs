@@ -9,7 +9,11 @@ use crate::control::CancelToken;
 use crate::exit::Exit;
 use crate::output::OutputError;
 use crate::output::staged::create_files_atomically;
-use crate::pipeline::{ImportError, ImportedScene, import_scene};
+use crate::pipeline::protocol::Failure;
+use crate::pipeline::{
+    ImportError, ImportedScene, check_scene_with_options, has_foreign_extension, has_model_extension,
+    import_scene,
+};
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::has_scene_extension;
 use crate::signals;
@@ -38,7 +42,21 @@ fn convert_and_write(args: &ImportArgs, console: &Console, token: &CancelToken) 
             &format!("{} already exists; choose another scene with -o", there.display()),
         );
     }
-    let imported = match import_scene(&args.file, &folder, &args.foreign.options(), token) {
+    let options = args.foreign.options();
+    // A scene may come from a stranger. Its files are copied only if they are meshes and images, so that it cannot
+    // obtain private files.
+    if !has_model_extension(&args.file) && has_foreign_extension(&args.file) {
+        match check_scene_with_options(&args.file, &[], &options, token) {
+            Ok(_) => {}
+            Err(_) if token.is_canceled() => return Exit::FAILED,
+            Err(Failure::Scene(diagnostics)) => {
+                console.print_diagnostics(&diagnostics);
+                return Exit::WRONG;
+            }
+            Err(Failure::Work(message)) => return console.print_error(Exit::FAILED, &message),
+        }
+    }
+    let imported = match import_scene(&args.file, &folder, &options, token) {
         Ok(imported) => imported,
         Err(_) if token.is_canceled() => return Exit::FAILED,
         Err(ImportError::Scene(diagnostics)) => {
