@@ -90,7 +90,7 @@ impl AssetError {
     }
 
     /// Creates the error for a file that the system cannot read.
-    pub(crate) fn from_io(path: &Path, error: &io::Error) -> Self {
+    pub fn from_io(path: &Path, error: &io::Error) -> Self {
         match is_too_many_open_files(error) {
             true => Self::TooManyOpenFiles { path: path.to_owned() },
             false => Self::unreadable(path, describe_error(error)),

@@ -21,7 +21,7 @@ mod textures;
 mod values;
 mod xml;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use self::graph::{GraphBuilder, ObjectKind};
 use self::reader::SceneReader;
@@ -32,7 +32,7 @@ use super::foreign::import::{CopiedFile, check_scene_before_import, read_copied_
 use super::model::file_name;
 use super::{ForeignReadContext, ForeignScene, ImportedScene};
 use crate::assets::Companion;
-use crate::scene::diagnostic::{Diagnostic, Severity};
+use crate::scene::diagnostic::Diagnostic;
 
 /// Reads a scene.
 pub(super) fn read(path: &Path, context: &ForeignReadContext<'_>) -> Result<ForeignScene, ForeignError> {

@@ -19,7 +19,7 @@ use crate::formats::model::UsedNames;
 use crate::math::{DMat4, DVec3};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::nearest::nearest_name;
-use crate::scene::{BuiltValue, SceneDocumentBuilder, SourceFiles};
+use crate::scene::{SceneDocumentBuilder, SourceFiles};
 use crate::stages::containers::GltfContainers;
 
 /// The use of a color. It determines how spectra are converted.

@@ -40,7 +40,7 @@ use super::foreign::ForeignError;
 use super::foreign::import::{CopiedFile, check_scene_before_import, read_copied_files};
 use super::foreign::sources::SourceReader;
 use super::{ForeignReadContext, ForeignScene, ImportedScene};
-use crate::assets::{AssetError, Companion};
+use crate::assets::Companion;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::{SceneDocumentBuilder, SourceFiles};
 
@@ -70,7 +70,7 @@ fn read_scene(
     path: &Path,
     import: Option<&str>,
     context: &ForeignReadContext<'_>,
-) -> Result<(ForeignScene, Vec<(String, PathBuf)>), ForeignError> {
+) -> Result<(ForeignScene, Vec<CopiedFile>), ForeignError> {
     let mut sources = SourceReader::default();
     let Parser { errors, statements, .. } = parser::parse(path, &mut sources, context.token)?;
     if !errors.is_empty() {
