@@ -38,18 +38,18 @@ fn strict_import_rejects_only_substitutions() {
 #[test]
 fn import_copies_only_meshes_and_images() {
     let dir = TestDir::new();
-    dir.write("secret.txt", "a private key");
+    dir.write("secret.png", "a private key");
     let bitmap = r#"<bsdf type="diffuse"><texture type="bitmap" name="reflectance">
-        <string name="filename" value="secret.txt"/></texture></bsdf></shape>"#;
+        <string name="filename" value="secret.png"/></texture></bsdf></shape>"#;
     dir.write("a.xml", mitsuba("path", "").replace("</shape>", bitmap));
-    let map = "Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"secret.txt\"\n\
+    let map = "Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"secret.png\"\n\
         Material \"diffuse\" \"texture reflectance\" \"t\"\n";
     dir.write(
         "b.pbrt",
         format!("Camera \"perspective\"\nWorldBegin\n{map}Translate 0 0 5\nShape \"sphere\"\n"),
     );
     for file in ["a.xml", "b.pbrt"] {
-        assert_mentions(&dir.expect(&format!("import {file} -o scene.toml"), 2), &["secret.txt"]);
+        assert_mentions(&dir.expect(&format!("import {file} -o scene.toml"), 2), &["secret.png"]);
         assert!(!dir.path("scene.toml").exists() && !dir.path("scene_files").exists(), "{file}");
     }
 }
