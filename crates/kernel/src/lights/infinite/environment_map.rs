@@ -41,8 +41,8 @@ impl MapRows {
 pub struct EnvironmentMap {
     texels: Arc<Texels>,
     cells: PiecewiseConstant2D,
-    /// Polar angles of the rows.
-    rows: MapRows,
+    /// [`MapRows::scale_and_offset`].
+    scale_and_offset: (f32, f32),
     /// Cosines of the polar angles at the tops of the rows of cells, followed by −1.
     heights: Vec<f64>,
     /// Probability of each row divided by the solid angle of one of its cells, in sr⁻¹.
@@ -72,7 +72,7 @@ impl EnvironmentMap {
     /// texels are black.
     pub fn with_rows(texels: Arc<Texels>, map_rows: MapRows) -> Option<Self> {
         let (columns, rows) = (texels.width as usize, texels.height as usize);
-        let (scale, offset) = map_rows.scale_and_offset(texels.height);
+        let scale_and_offset @ (scale, offset) = map_rows.scale_and_offset(texels.height);
         let height = |row: usize| match row {
             0 => 1.0,
             row if row > rows => -1.0,
@@ -101,7 +101,7 @@ impl EnvironmentMap {
         let pdfs = (0..=rows).map(density).collect();
         // Each row of cells is between two rows of texels, and the heights range from 1 to −1.
         let mean_luminance = sum / (4.0 * columns as f64);
-        Some(Self { texels, cells, rows: map_rows, heights, pdfs, mean_luminance })
+        Some(Self { texels, cells, scale_and_offset, heights, pdfs, mean_luminance })
     }
 
     /// Mean luminance over all directions.
@@ -112,7 +112,7 @@ impl EnvironmentMap {
     /// Mean color over all directions. Between row centers, colors depend linearly on the polar angle.
     pub fn mean(&self) -> Vec3 {
         let rows = self.texels.height;
-        let (scale, offset) = self.rows.scale_and_offset(rows);
+        let (scale, offset) = self.scale_and_offset;
         let (step, first) = (std::f64::consts::PI / f64::from(scale), 1.0 - f64::from(offset));
         let (sin, cos) =
             (|row: f64| libm::sin((row + first) * step), |row: f64| libm::cos((row + first) * step));
@@ -188,7 +188,7 @@ impl EnvironmentMap {
         let turns = (column + 0.5 + along) / self.texels.width as f32 - 0.5 - turn;
         let (sin, cos) = sin_cos(2.0 * PI * turns);
         let direction = Vec3::new(across * sin, y as f32, -across * cos);
-        let (scale, offset) = self.rows.scale_and_offset(self.texels.height);
+        let (scale, offset) = self.scale_and_offset;
         let down = atan2(across, y as f32) * (1.0 / PI) * scale + offset - row;
         (direction, down.max(0.0).min(1.0))
     }
@@ -267,8 +267,7 @@ impl EnvironmentMap {
     /// Cell coordinates of a unit direction.
     #[inline(always)]
     fn cell_coordinates(&self, direction: Vec3, turn: f32) -> (f32, f32) {
-        let (width, (scale, offset)) =
-            (self.texels.width as f32, self.rows.scale_and_offset(self.texels.height));
+        let (width, (scale, offset)) = (self.texels.width as f32, self.scale_and_offset);
         let turns = 0.5 + atan2(direction.x, -direction.z) * (0.5 / PI) + turn;
         let x = (turns - turns.floor()) * width - 0.5;
         let x = if x < 0.0 { x + width } else { x };
