@@ -1,11 +1,10 @@
 //! Packets of 16 non-specular BSDFs of the same kind. All functions must be called inside a SIMD kernel.
 
-use super::bsdf::{BsdfValues, DielectricSamplePacket, LobesToSample, NarrowLobe, ShownLobes, UvPacket};
+use super::bsdf::{BsdfValues, DielectricSamplePacket, LobesToSample, NarrowLobe, ShownLobes};
 use super::bxdf::{Bxdf, BxdfFlags, LobesWithNormal, ShadingGeometry};
 use super::microfacet::tilt_to_face_viewer_branchless;
 use super::rough_dielectric::DielectricBxdf;
 use super::shown_lobe_factors::{LobeFactorsPacket, ShownLobeFactors};
-use super::texture::Texture;
 use crate::math::Vec3;
 use crate::math::lanes::{
     F32x16, Mask, PACKET_SIZE, Simd, SimdKernel, TRUE, Vec3x16, lane, mask_from_bits, set_lane,
@@ -71,24 +70,23 @@ impl<B: Bxdf> BxdfPacket<B> {
         self.shows_all &= other.shows_all;
     }
 
-    /// Sets the surfaces of some lanes to a material with these values. If there is a texture, its values at
-    /// the given coordinates replace the color. Later entries of `shown` override earlier ones. Returns a
-    /// mask of surfaces that reflect nothing.
+    /// Sets the surfaces of some lanes to a material with these values. `colors` contains the values of the
+    /// material's texture, if it has one. Later entries of `shown` override earlier ones. Returns a mask of
+    /// surfaces that reflect nothing.
     #[inline(always)]
     pub fn evaluate_material_into_lanes(
         &mut self,
         point: &B::Point,
-        color: Option<(&Texture, &UvPacket)>,
+        colors: Option<&Vec3x16>,
         shown: &[(u32, ShownLobes)],
         simd: impl Simd,
     ) -> u32 {
         let bsdf = B::new(point, Vec3::X);
         let mut filled = bsdf.splat();
-        if let Some((texture, uv)) = color {
-            let colors = texture.lookup_packet(uv);
+        if let Some(colors) = colors {
             for i in 0..PACKET_SIZE {
                 let mut bsdf = bsdf;
-                bsdf.set_looked_up_color(point, lane(&colors, i));
+                bsdf.set_looked_up_color(point, lane(colors, i));
                 bsdf.set(&mut filled, i);
             }
         }
@@ -360,6 +358,64 @@ impl<const THROUGH: bool, const BECKMANN: bool> BxdfPacket<DielectricBxdf<THROUG
 /// Wrappers around the large functions. Depending on [`Bxdf::IS_INLINED`], they inline the function or call
 /// the copy for the instruction set.
 impl<B: Bxdf> BxdfPacket<B> {
+    /// [`BxdfPacket::set_bsdf`].
+    #[inline(always)]
+    pub(super) fn set_bsdf_out_of_line(
+        &mut self,
+        i: usize,
+        point: &B::Point,
+        shown: ShownLobes,
+        directions: &ShadingGeometry,
+    ) {
+        #[inline(never)]
+        fn set_bsdf<B: Bxdf>(
+            packet: &mut BxdfPacket<B>,
+            i: usize,
+            point: &B::Point,
+            shown: ShownLobes,
+            directions: &ShadingGeometry,
+        ) {
+            packet.set_bsdf(i, point, shown, directions);
+        }
+        if B::IS_INLINED {
+            self.set_bsdf(i, point, shown, directions);
+        } else {
+            set_bsdf(self, i, point, shown, directions);
+        }
+    }
+
+    /// [`BxdfPacket::evaluate_material_into_lanes`].
+    #[inline(always)]
+    pub(super) fn evaluate_material_into_lanes_out_of_line(
+        &mut self,
+        point: &B::Point,
+        colors: Option<&Vec3x16>,
+        shown: &[(u32, ShownLobes)],
+        simd: impl Simd,
+    ) -> u32 {
+        if B::IS_INLINED {
+            self.evaluate_material_into_lanes(point, colors, shown, simd)
+        } else {
+            simd.call_out_of_line(MaterialKernel { packet: self, point, colors, shown })
+        }
+    }
+
+    /// [`BxdfPacket::set_normals_and_directions`].
+    #[inline(always)]
+    pub(super) fn set_normals_and_directions_out_of_line(
+        &mut self,
+        of: Option<&Mask>,
+        normals: &mut Vec3x16,
+        directions: &Vec3x16,
+        simd: impl Simd,
+    ) {
+        if B::IS_INLINED {
+            self.set_normals_and_directions(of, normals, directions);
+        } else {
+            simd.call_out_of_line(NormalsAndDirectionsKernel { packet: self, of, normals, directions });
+        }
+    }
+
     /// [`BxdfPacket::f`].
     #[inline(always)]
     pub(super) fn f_out_of_line(&self, wi: &Vec3x16, simd: impl Simd) -> BsdfValues {
@@ -411,6 +467,40 @@ impl<const THROUGH: bool, const BECKMANN: bool> BxdfPacket<DielectricBxdf<THROUG
         simd: impl Simd,
     ) -> DielectricSamplePacket {
         simd.call_out_of_line(EitherSideSamplingKernel { packet: self, choices, u })
+    }
+}
+
+/// Kernel of [`BxdfPacket::evaluate_material_into_lanes`].
+struct MaterialKernel<'a, B: Bxdf> {
+    packet: &'a mut BxdfPacket<B>,
+    point: &'a B::Point,
+    colors: Option<&'a Vec3x16>,
+    shown: &'a [(u32, ShownLobes)],
+}
+
+impl<B: Bxdf> SimdKernel for MaterialKernel<'_, B> {
+    type Output = u32;
+
+    #[inline(always)]
+    fn run(self, simd: impl Simd) -> u32 {
+        self.packet.evaluate_material_into_lanes(self.point, self.colors, self.shown, simd)
+    }
+}
+
+/// Kernel of [`BxdfPacket::set_normals_and_directions`].
+struct NormalsAndDirectionsKernel<'a, B: Bxdf> {
+    packet: &'a mut BxdfPacket<B>,
+    of: Option<&'a Mask>,
+    normals: &'a mut Vec3x16,
+    directions: &'a Vec3x16,
+}
+
+impl<B: Bxdf> SimdKernel for NormalsAndDirectionsKernel<'_, B> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self, _: impl Simd) {
+        self.packet.set_normals_and_directions(self.of, self.normals, self.directions);
     }
 }
 

@@ -233,12 +233,18 @@ macro_rules! kinds {
                 shown: ShownLobes,
                 directions: &ShadingGeometry,
             ) {
-                $(if let (Self::$kind(row), BxdfPoint::$kind(bsdf)) = (&mut *self, bsdf) {
-                    row.set_bsdf(i, bsdf, shown, directions);
-                })+
-                $(if let (Self::$part(row), BxdfPoint::$part(bsdf)) = (&mut *self, bsdf) {
-                    row.set_bsdf(i, bsdf, shown, directions);
-                })+
+                match self {
+                    $(Self::$kind(row) => {
+                        if let BxdfPoint::$kind(bsdf) = bsdf {
+                            row.set_bsdf_out_of_line(i, bsdf, shown, directions);
+                        }
+                    })+
+                    $(Self::$part(row) => {
+                        if let BxdfPoint::$part(bsdf) = bsdf {
+                            row.set_bsdf_out_of_line(i, bsdf, shown, directions);
+                        }
+                    })+
+                }
             }
 
             /// [`BxdfPacket::evaluate_material_into_lanes`] for a material of the same kind as the packet.
@@ -250,19 +256,28 @@ macro_rules! kinds {
                 shown: &[(u32, ShownLobes)],
                 simd: impl Simd,
             ) -> u32 {
-                $(if let (Self::$kind(row), NonSpecular::$kind(material)) = (&mut *self, material) {
-                    let point = material.look_up_parameters(&mut WhiteLookup);
-                    let texture = material.color_to_look_up().and_then(ColorOrTexture::texture);
-                    return row.evaluate_material_into_lanes(&point, texture.map(|texture| &**texture).zip(uv), shown, simd);
-                })+
-                0
+                let colors = material.packet_texture().zip(uv).map(|(texture, uv)| texture.lookup_packet(uv));
+                match self {
+                    $(Self::$kind(row) => {
+                        let NonSpecular::$kind(material) = material else { return 0 };
+                        let point = material.look_up_parameters(&mut WhiteLookup);
+                        row.evaluate_material_into_lanes_out_of_line(&point, colors.as_ref(), shown, simd)
+                    })+
+                    $(Self::$part(_) => 0),+
+                }
             }
 
             /// [`BxdfPacket::set_normals_and_directions`].
             #[inline(always)]
-            pub fn set_normals_and_directions(&mut self, of: Option<&Mask>, normals: &mut Vec3x16, directions: &Vec3x16) {
+            pub fn set_normals_and_directions(
+                &mut self,
+                of: Option<&Mask>,
+                normals: &mut Vec3x16,
+                directions: &Vec3x16,
+                simd: impl Simd,
+            ) {
                 match self {
-                    $(Self::$kind(row) => row.set_normals_and_directions(of, normals, directions),)+
+                    $(Self::$kind(row) => row.set_normals_and_directions_out_of_line(of, normals, directions, simd),)+
                     $(Self::$part(_) => {}),+
                 }
             }
@@ -270,12 +285,18 @@ macro_rules! kinds {
             /// [`BxdfPacket::copy_lane`] from a packet of the same kind.
             #[inline(always)]
             pub fn copy_lane(&mut self, i: usize, other: &Self, from: usize) {
-                $(if let (Self::$kind(row), Self::$kind(other)) = (&mut *self, other) {
-                    row.copy_lane(i, other, from);
-                })+
-                $(if let (Self::$part(row), Self::$part(other)) = (&mut *self, other) {
-                    row.copy_lane(i, other, from);
-                })+
+                match self {
+                    $(Self::$kind(row) => {
+                        if let Self::$kind(other) = other {
+                            row.copy_lane(i, other, from);
+                        }
+                    })+
+                    $(Self::$part(row) => {
+                        if let Self::$part(other) = other {
+                            row.copy_lane(i, other, from);
+                        }
+                    })+
+                }
             }
 
             /// [`BxdfPacket::f`].
