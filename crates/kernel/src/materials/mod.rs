@@ -109,6 +109,12 @@ impl Material {
         }
     }
 
+    /// Whether the material is a blend.
+    #[inline]
+    pub fn is_blend(&self) -> bool {
+        self.as_blend().is_some()
+    }
+
     /// Whether a property holds for any part of a blend.
     fn is_any_part(&self, property: impl Fn(&Self) -> bool) -> bool {
         self.as_blend().is_some_and(|blend| blend.parts.iter().any(property))

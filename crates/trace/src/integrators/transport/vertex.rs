@@ -359,6 +359,9 @@ fn choose_blend_part<'a>(
     material: &'a Material,
     at: &TexturePoint,
 ) -> &'a Material {
+    if !material.is_blend() {
+        return material;
+    }
     let number = || tile.sampler_for_slot(path.slot).pair(path.path, Dimension::Blend).x;
     match path.state.pdf > 0.0 {
         true => material.choose_part(&at.without_footprint(), number, &mut 0),
