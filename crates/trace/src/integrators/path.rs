@@ -182,16 +182,17 @@ impl CameraPathWavefront<'_, '_> {
             // Sample lights.
             self.direct.sample_group_lights(vertices.clone(), tile, aov, shares_with_paths)?;
             for (index, number) in vertices.clone().enumerate() {
-                let mut light = self.direct.reflected_light((index, number), tile, aov, shares_with_paths);
-                let row = self.direct.batch_at_index(number);
+                let packet = (index, number);
+                let light = self.direct.complete_reflected_light(packet, tile, aov, shares_with_paths);
+                light.rays.add_to(self.counters);
                 // Gather photons.
                 if let Some(maps) = self.maps {
+                    let row = self.direct.batch_at_index(number);
                     let splits_lobes = self.direct.splits_lobes(row);
                     let gathered = gather_photons(tile, row, maps, depth, (aov, splits_lobes));
-                    light.add_lanes(row.used, &gathered, splits_lobes);
+                    self.direct.add_reflected_light(packet, &gathered, splits_lobes);
                 }
-                light.rays.add_to(self.counters);
-                self.direct.accumulate_reflected_light(number, aov, &light);
+                self.direct.accumulate_reflected_light(packet, aov);
             }
             // Sample BSDFs, with Russian roulette.
             for number in vertices {

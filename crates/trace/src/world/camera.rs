@@ -227,7 +227,13 @@ impl Camera {
                     Some(lens) => {
                         fill_ray_packet(|lane| self.lens_ray(self.position, direction(lane), lens, lane))
                     }
-                    None => fill_ray_packet(|lane| (eye, direction(lane).normalize().as_vec3())),
+                    None => {
+                        let mut directions = [[0.0; PACKET_SIZE]; 3];
+                        for lane in 0..PACKET_SIZE {
+                            set_lane(&mut directions, lane, direction(lane).normalize().as_vec3());
+                        }
+                        RayPacket::from_soa(eye.to_array().map(|at| [at; PACKET_SIZE]), directions)
+                    }
                 };
                 (rays, u32::MAX)
             }

@@ -2,7 +2,6 @@
 
 use crate::geometry::packet::F32x16;
 use crate::integrators::RayCounters;
-use crate::integrators::view::PathAov;
 use crate::math::Vec3;
 use crate::math::lanes::{PACKET_SIZE, Vec3x16, mask_from_bits, set_lane};
 
@@ -34,31 +33,11 @@ impl std::ops::AddAssign for DirectLightCounters {
     }
 }
 
-/// Direct light that a packet of vertices reflects toward the viewer.
-#[repr(align(64))]
-pub struct ReflectedDirectLightPacket {
-    /// Reflected radiance, before multiplication by the path throughput.
-    pub light: Vec3x16,
-    /// The part of `light` from wide lobes, if it was requested.
-    pub diffuse: Vec3x16,
-    /// Rays and texture lookups so far.
-    pub rays: DirectLightCounters,
-}
-
-impl ReflectedDirectLightPacket {
-    /// Adds reflected light, and if `splits_lobes` its part from wide lobes, in the lanes set in `bits`.
-    pub fn add_lanes(&mut self, bits: u32, [light, diffuse]: &[Vec3x16; 2], splits_lobes: bool) {
-        add_masked_lanes(bits, light, &mut self.light);
-        if splits_lobes {
-            add_masked_lanes(bits, diffuse, &mut self.diffuse);
-        }
-    }
-}
-
-/// Sums over all light samples.
+/// Direct light that a packet of vertices reflects toward the viewer, summed over all light samples.
+#[derive(Clone)]
 #[repr(align(64))]
 pub struct LightSums {
-    /// Unoccluded reflected light.
+    /// Unoccluded reflected light, before multiplication by the path throughput.
     pub light: Vec3x16,
     /// The part of `light` from wide lobes, if it was requested.
     pub diffuse: Vec3x16,
@@ -77,17 +56,21 @@ impl LightSums {
         rays: DirectLightCounters { shadow: 0, scattered: 0, lookups: 0 },
     };
 
-    /// Returns the reflected light or, for that AOV, the lit fraction.
-    #[inline(always)]
-    pub fn reflected_light_for_aov(&self, aov: PathAov) -> ReflectedDirectLightPacket {
-        let mut light = self.light;
-        if aov == PathAov::LitFraction {
-            for i in 0..PACKET_SIZE {
-                let share = if self.total[i] > 0.0 { self.light[0][i] / self.total[i] } else { 0.0 };
-                set_lane(&mut light, i, Vec3::splat(share));
-            }
+    /// Replaces the reflected light with the lit fraction.
+    #[cold]
+    pub fn replace_light_with_lit_fraction(&mut self) {
+        for i in 0..PACKET_SIZE {
+            let share = if self.total[i] > 0.0 { self.light[0][i] / self.total[i] } else { 0.0 };
+            set_lane(&mut self.light, i, Vec3::splat(share));
         }
-        ReflectedDirectLightPacket { light, diffuse: self.diffuse, rays: self.rays }
+    }
+
+    /// Adds reflected light, and if `splits_lobes` its part from wide lobes, in the lanes set in `bits`.
+    pub fn add_lanes(&mut self, bits: u32, [light, diffuse]: &[Vec3x16; 2], splits_lobes: bool) {
+        add_masked_lanes(bits, light, &mut self.light);
+        if splits_lobes {
+            add_masked_lanes(bits, diffuse, &mut self.diffuse);
+        }
     }
 }
 

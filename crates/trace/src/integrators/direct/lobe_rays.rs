@@ -1,7 +1,7 @@
 //! Rays in narrow lobes, which complement light samples.
 
 use super::all_lights::add_traversal_cost;
-use super::light_sums::ReflectedDirectLightPacket;
+use super::light_sums::LightSums;
 use super::unshadowed::LobeRayWithoutSoftShadows;
 use crate::geometry::packet::{RayPacket, set_bit_lanes};
 use crate::integrators::transport::batch::{BsdfValuesAndCosines, VertexBatch};
@@ -28,23 +28,23 @@ pub struct LobeRayTracingKernel<'a> {
     pub aov: PathAov,
     /// Media at the vertices, or `None` if all vertices are in air.
     pub interior_lists: Option<&'a InteriorListPool>,
-    /// The reflected light to which the results are added.
-    pub arrived: ReflectedDirectLightPacket,
+    /// The reflected light to which the light found by the rays is added.
+    pub sums: &'a mut LightSums,
 }
 
 impl LobeRayTracingKernel<'_> {
-    /// Traces the rays. Returns the reflected light, including the light that the rays find.
-    pub fn trace(self) -> ReflectedDirectLightPacket {
-        self.tile.world.geometry.instruction_set().run(self)
+    /// Traces the rays.
+    pub fn trace(self) {
+        self.tile.world.geometry.instruction_set().run(self);
     }
 }
 
 impl SimdKernel for LobeRayTracingKernel<'_> {
-    type Output = ReflectedDirectLightPacket;
+    type Output = ();
 
     #[inline(always)]
-    fn run(self, simd: impl Simd) -> ReflectedDirectLightPacket {
-        let Self { tile, row, sharp, aov, interior_lists, mut arrived } = self;
+    fn run(self, simd: impl Simd) {
+        let Self { tile, row, sharp, aov, interior_lists, sums } = self;
         let count = tile.settings.render.shadow_samples;
         let sampler = row.sampler_packet(tile);
         let transmittance = |i: usize, distance: f32| {
@@ -72,7 +72,7 @@ impl SimdKernel for LobeRayTracingKernel<'_> {
                 ends[i] = if sent & bit != 0 { f32::INFINITY } else { -1.0 };
             }
             let rays = RayPacket::from_soa(row.from, wi).with_start_triangles(row.ray_start_triangles(&wi));
-            arrived.rays.scattered += u64::from(sent.count_ones());
+            sums.rays.scattered += u64::from(sent.count_ones());
             // Without soft shadows, add the light from every emitter along the rays, even if the emitter is
             // occluded.
             if tile.settings.render.shadows != ShadowMode::Soft {
@@ -81,10 +81,10 @@ impl SimdKernel for LobeRayTracingKernel<'_> {
                 for i in set_bit_lanes(lit) {
                     let found =
                         LobeRayWithoutSoftShadows { tile, row, lane: i, ray: rays.ray(i), pdf: pdfs[i] };
-                    let radiance = found.radiance(|distance| transmittance(i, distance), &mut arrived.rays);
+                    let radiance = found.radiance(|distance| transmittance(i, distance), &mut sums.rays);
                     let value = lane(narrow, i) * radiance * (cosines[i] / (pdfs[i] * count as f32));
-                    let sum = lane(&arrived.light, i) + value;
-                    set_lane(&mut arrived.light, i, sum);
+                    let sum = lane(&sums.light, i) + value;
+                    set_lane(&mut sums.light, i, sum);
                 }
                 continue;
             }
@@ -94,13 +94,13 @@ impl SimdKernel for LobeRayTracingKernel<'_> {
                 for i in set_bit_lanes(sent) {
                     ends[i] = hits.get(i).map_or(f32::INFINITY, |hit| hit.t);
                 }
-                add_traversal_cost(tile, &rays, &ends, sent, &mut arrived.light);
+                add_traversal_cost(tile, &rays, &ends, sent, &mut sums.light);
                 continue;
             }
             // Add the light found by the rays.
             for i in set_bit_lanes(sent) {
                 let pdf = pdfs[i];
-                let lookups = &mut arrived.rays.lookups;
+                let lookups = &mut sums.rays.lookups;
                 let radiance = match hits.get(i) {
                     hit if tile.world.has_null_interaction_surfaces() => {
                         let hit = hit.map(|shape| Hit { shape, object: objects[i] });
@@ -123,10 +123,9 @@ impl SimdKernel for LobeRayTracingKernel<'_> {
                 };
                 let f = lane(narrow, i);
                 let value = f * radiance * (cosines[i] / (pdf * count as f32));
-                let sum = lane(&arrived.light, i) + value;
-                set_lane(&mut arrived.light, i, sum);
+                let sum = lane(&sums.light, i) + value;
+                set_lane(&mut sums.light, i, sum);
             }
         }
-        arrived
     }
 }

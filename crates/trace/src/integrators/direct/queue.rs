@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::all_lights::SampleAllLights;
-use super::light_sums::{LightSums, ReflectedDirectLightPacket};
+use super::light_sums::LightSums;
 use super::lobe_rays::LobeRayTracingKernel;
 use super::mis::CompetingTechnique;
 use super::shadow_lift::ShadowOriginLiftKernel;
@@ -20,7 +20,7 @@ use crate::integrators::transport::vertex::ShadingVertex;
 use crate::integrators::view::{PathAov, PathClasses};
 use crate::materials::BxdfKind;
 use crate::math::Vec3;
-use crate::math::lanes::{PACKET_SIZE, lane};
+use crate::math::lanes::{PACKET_SIZE, Vec3x16, lane};
 use crate::scene::description::ShadowMode;
 
 /// Vertices that await direct lighting. The result for a vertex does not depend on which vertices share its
@@ -87,10 +87,8 @@ impl DirectLightVertexQueue {
         self.clear();
         self.cones.clear();
         self.cones.resize(if has_cones { paths } else { 0 }, RayCone::default());
-        self.arrived.clear();
-        self.arrived.resize(paths, Vec3::ZERO);
-        self.arrived_diffuse.clear();
-        self.arrived_diffuse.resize(if splits_lobes { paths } else { 0 }, Vec3::ZERO);
+        resize_with_zeros(&mut self.arrived, paths);
+        resize_with_zeros(&mut self.arrived_diffuse, if splits_lobes { paths } else { 0 });
         self.interior_lists.clear();
     }
 
@@ -238,7 +236,7 @@ impl DirectLightVertexQueue {
         &self.cones
     }
 
-    /// Samples lights at the packets of a group and traces the shadow rays, for [`Self::reflected_light`].
+    /// Samples lights at the packets of a group and traces the shadow rays, for [`Self::complete_reflected_light`].
     /// `shares_with_paths` is true if continuing paths compete with the light samples.
     pub fn sample_group_lights(
         &mut self,
@@ -272,27 +270,30 @@ impl DirectLightVertexQueue {
         Ok(())
     }
 
-    /// Light reflected at packet `index` of the group passed to [`Self::sample_group_lights`], including the
-    /// light found by lobe rays. `number` is the index of the packet in the queue.
-    pub fn reflected_light(
-        &self,
+    /// Completes the reflected light of packet `index` in the group passed to
+    /// [`Self::sample_group_lights`] with the light found by lobe rays, and returns it. `number` is the index
+    /// of the packet in the queue.
+    pub fn complete_reflected_light(
+        &mut self,
         (index, number): (usize, usize),
         tile: &TileContext<'_>,
         aov: PathAov,
         shares_with_paths: bool,
-    ) -> ReflectedDirectLightPacket {
+    ) -> &mut LightSums {
+        if aov == PathAov::LitFraction {
+            self.sums[index].replace_light_with_lit_fraction();
+        }
         let row = &self.rows[number];
         let request = DirectLightPacketRequest::new(number, row, aov, shares_with_paths);
-        let arrived = self.sums[index].reflected_light_for_aov(aov);
         match self.competing_technique(request, tile, aov) {
             CompetingTechnique::Lobes(sharp) => {
-                let interior_lists = self.interiors_of_batch(row);
-                LobeRayTracingKernel { tile, row, sharp, aov, interior_lists, arrived }.trace()
+                let interior_lists = interiors_of_batch(&self.interior_lists, row);
+                let sums = &mut self.sums[index];
+                LobeRayTracingKernel { tile, row, sharp, aov, interior_lists, sums }.trace();
             }
-            CompetingTechnique::Nothing | CompetingTechnique::Paths | CompetingTechnique::NarrowPaths => {
-                arrived
-            }
+            CompetingTechnique::Nothing | CompetingTechnique::Paths | CompetingTechnique::NarrowPaths => {}
         }
+        &mut self.sums[index]
     }
 
     /// The technique that competes with light samples at a packet.
@@ -316,11 +317,6 @@ impl DirectLightVertexQueue {
         }
     }
 
-    /// Media at a packet's vertices, or `None` if all vertices are in air.
-    fn interiors_of_batch(&self, row: &VertexBatch) -> Option<&InteriorListPool> {
-        (!self.interior_lists.are_all_air() && row.has_vertex_in_glass()).then_some(&self.interior_lists)
-    }
-
     /// Samples lights at a packet. Shadow rays to picked lights are pooled under index `number`.
     fn sample_packet_lights(
         &mut self,
@@ -335,7 +331,7 @@ impl DirectLightVertexQueue {
         let mut pool = std::mem::take(&mut self.pool);
         let row = &self.rows[request.number];
         let (competing, interior_lists) =
-            (self.competing_technique(request, tile, aov), self.interiors_of_batch(row));
+            (self.competing_technique(request, tile, aov), interiors_of_batch(&self.interior_lists, row));
         let lighting = SampleAllLights::<true> {
             tile,
             row,
@@ -368,14 +364,20 @@ impl DirectLightVertexQueue {
         }
     }
 
-    /// Adds a packet's reflected light to its paths. A path has two vertices at a transmissive surface.
-    pub fn accumulate_reflected_light(
+    /// Adds reflected light, and if `splits_lobes` its part from wide lobes, to packet `index` in the group.
+    pub fn add_reflected_light(
         &mut self,
-        number: usize,
-        aov: PathAov,
-        arrived: &ReflectedDirectLightPacket,
+        (index, number): (usize, usize),
+        light: &[Vec3x16; 2],
+        splits_lobes: bool,
     ) {
-        let row = &self.rows[number];
+        self.sums[index].add_lanes(self.rows[number].used, light, splits_lobes);
+    }
+
+    /// Adds the reflected light of packet `index` in the group to its paths. A path has two vertices at a
+    /// transmissive surface.
+    pub fn accumulate_reflected_light(&mut self, (index, number): (usize, usize), aov: PathAov) {
+        let (row, arrived) = (&self.rows[number], &self.sums[index]);
         let light = match aov {
             PathAov::Radiance(_) | PathAov::LitFraction => row.times_throughput(&arrived.light),
             PathAov::TraversalCost => arrived.light,
@@ -417,6 +419,19 @@ enum WideNarrowLobeSplit {
     OnlyNarrow,
     /// The surfaces may have wide and narrow lobes.
     Mixed,
+}
+
+/// Media at a packet's vertices, or `None` if all vertices are in air.
+fn interiors_of_batch<'a>(pool: &'a InteriorListPool, row: &VertexBatch) -> Option<&'a InteriorListPool> {
+    (!pool.are_all_air() && row.has_vertex_in_glass()).then_some(pool)
+}
+
+/// Makes all of a vector's elements zero and changes its length.
+fn resize_with_zeros(sums: &mut Vec<Vec3>, count: usize) {
+    // `Vec::resize` would write the elements one component at a time.
+    sums.truncate(count);
+    bytemuck::fill_zeroes(sums);
+    sums.resize(count, Vec3::ZERO);
 }
 
 /// Mask of vertices whose direct light is visible in the view and may be nonzero.

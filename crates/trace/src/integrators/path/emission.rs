@@ -40,25 +40,32 @@ impl CameraPathWavefront<'_, '_> {
         let tile = self.tile;
         let render = &tile.settings.render;
         // Add the emission and ambient light of plain surfaces.
-        let mut known = None;
+        let has_ambient = render.ambient != Vec3::ZERO && self.depth < render.max_depth;
+        let mut known: Option<(usize, Vec3, Option<Vec3>)> = None;
         for lane in set_bit_lanes(plain) {
             let Some(hit) = packet.hit(lane) else { continue };
             let index = tile.world.material_index(&hit);
-            if known.is_none_or(|(own, _)| own != index) {
-                known = tile.packet_material_if_plain(index).map(|plain| (index, plain));
+            if known.is_none_or(|(own, ..)| own != index) {
+                known = tile.packet_material_if_plain(index).map(|(material, _)| {
+                    let ambient = material.ambient.filter(|_| has_ambient);
+                    (index, material.emission, ambient.map(|ambient| render.ambient * ambient))
+                });
             }
-            let Some((_, (material, _))) = known else { continue };
+            let Some((_, emission, ambient)) = known else { continue };
             let slot = first + lane as u32;
             if packet.shining & 1 << lane != 0 {
-                self.accumulator.add_non_reflected(slot, NonReflectedTerm::Emitted, material.emission);
+                self.accumulator.add_non_reflected(slot, NonReflectedTerm::Emitted, emission);
             }
-            if render.ambient != Vec3::ZERO && self.depth < render.max_depth {
-                let Some(ambient) = material.ambient else { continue };
-                self.accumulator.add_non_reflected(slot, NonReflectedTerm::Ambient, render.ambient * ambient);
+            if let Some(ambient) = ambient {
+                self.accumulator.add_non_reflected(slot, NonReflectedTerm::Ambient, ambient);
             }
         }
         // Add the background and the infinite lights.
         let lights = &tile.world.lights;
+        if !lights.has_visible_infinite_lights() {
+            let slots = set_bit_lanes(beyond).map(|lane| first + lane as u32);
+            return self.accumulator.add_background(slots, render.background);
+        }
         for lane in set_bit_lanes(beyond) {
             let sky = lights.environment().map(|_| packet.sky_radiance_and_pdf_of_lane(lane));
             let beyond = lights.radiance_from_infinity_with_precomputed_sky(

@@ -114,6 +114,15 @@ impl Accumulator<'_> {
         }
     }
 
+    /// Adds the background to the slots of camera rays that leave the scene.
+    pub fn add_background(&mut self, slots: impl Iterator<Item = u32>, background: Vec3) {
+        if self.layers.is_none() && self.components_to_accumulate().emitted {
+            slots.for_each(|slot| self.radiance[slot as usize] += background);
+        } else {
+            slots.for_each(|slot| self.add_non_reflected(slot, NonReflectedTerm::Emitted, background));
+        }
+    }
+
     /// Adds light from a source that path `place` hits after its first diffuse or glossy surface.
     pub fn add_emitter_hit(&mut self, path: &PathRay, place: u32, radiance: Vec3) {
         match self.aov {
@@ -171,8 +180,10 @@ impl Accumulator<'_> {
     /// Adds direct light at vertices with consecutive slots. The camera must see all of these vertices.
     /// `diffuse` contains the diffuse parts, or nothing if they are not needed.
     pub fn add_direct_to_consecutive_slots(&mut self, first: u32, contributions: &[Vec3], diffuse: &[Vec3]) {
-        for (sum, contribution) in self.radiance[first as usize..].iter_mut().zip(contributions) {
-            *sum += *contribution;
+        // Add the components as one slice, which the compiler vectorizes.
+        let sums = bytemuck::cast_slice_mut::<Vec3, f32>(&mut self.radiance[first as usize..]);
+        for (sum, contribution) in sums.iter_mut().zip(bytemuck::cast_slice::<Vec3, f32>(contributions)) {
+            *sum += contribution;
         }
         let Some(layers) = self.layers.as_mut().filter(|_| !diffuse.is_empty()) else { return };
         layers.values.add_to_consecutive_samples(SampleLayer::Diffuse, first, diffuse.iter().copied());

@@ -197,18 +197,12 @@ impl LitScene {
         sums
     }
 
-    /// Adds the light found by lobe rays to `sums`.
+    /// Adds the light found by lobe rays to the red channel of `sums`.
     fn trace_lobe_rays(&self, row: &VertexBatch, sharp: u32, sums: &LightSums) -> [f32; PACKET_SIZE] {
-        let arrived = sums.reflected_light_for_aov(PathAov::ALL);
-        let kernel = LobeRayTracingKernel {
-            tile: &self.tile(),
-            row,
-            sharp,
-            aov: PathAov::ALL,
-            interior_lists: None,
-            arrived,
-        };
-        kernel.trace().light[0]
+        let (tile, mut sums) = (&self.tile(), sums.clone());
+        let (aov, interior_lists) = (PathAov::ALL, None);
+        LobeRayTracingKernel { tile, row, sharp, aov, interior_lists, sums: &mut sums }.trace();
+        sums.light[0]
     }
 
     /// Rays in BSDF-sampled directions.
