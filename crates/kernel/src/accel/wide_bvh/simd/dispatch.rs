@@ -16,7 +16,7 @@ impl InstructionSet {
     #[inline]
     pub fn run<L: SimdKernel>(self, work: L) -> L::Output {
         match self.or_best_supported() {
-            Self::Portable => work.run(PortableSimd),
+            Self::Portable => PortableSimd.call_out_of_line(work),
             #[cfg(target_arch = "x86_64")]
             // SAFETY: `or_best_supported` returns an instruction set that the processor supports.
             Self::Avx2 => unsafe { run_avx2(work) },
@@ -24,7 +24,7 @@ impl InstructionSet {
             // SAFETY: as above.
             Self::Avx512 => unsafe { run_avx512(work) },
             #[cfg(not(target_arch = "x86_64"))]
-            Self::Avx2 | Self::Avx512 => work.run(PortableSimd),
+            Self::Avx2 | Self::Avx512 => PortableSimd.call_out_of_line(work),
         }
     }
 }
