@@ -34,29 +34,26 @@ pub fn gather_photons(
     depth: u32,
     (aov, splits_lobes): (PathAov, bool),
 ) -> [Vec3x16; 2] {
-    let instruction_set = tile.world.geometry.instruction_set();
-    if splits_lobes {
-        instruction_set.run(GatherPhotonsKernel::<true> { tile, row, maps, depth, aov })
-    } else {
-        instruction_set.run(GatherPhotonsKernel::<false> { tile, row, maps, depth, aov })
-    }
+    let kernel = GatherPhotonsKernel { tile, row, maps, depth, aov, splits_lobes };
+    tile.world.geometry.instruction_set().run(kernel)
 }
 
-/// The work of [`gather_photons`] for one instruction set. `SPLIT` is `splits_lobes`.
-struct GatherPhotonsKernel<'a, const SPLIT: bool> {
+/// The work of [`gather_photons`] for one instruction set.
+struct GatherPhotonsKernel<'a> {
     tile: &'a TileContext<'a>,
     row: &'a VertexBatch,
     maps: &'a PhotonPassesBySample,
     depth: u32,
     aov: PathAov,
+    splits_lobes: bool,
 }
 
-impl<const SPLIT: bool> SimdKernel for GatherPhotonsKernel<'_, SPLIT> {
+impl SimdKernel for GatherPhotonsKernel<'_> {
     type Output = [Vec3x16; 2];
 
     #[inline(always)]
     fn run(self, simd: impl Simd) -> [Vec3x16; 2] {
-        let Self { tile, row, maps, depth, aov } = self;
+        let Self { tile, row, maps, depth, aov, splits_lobes } = self;
         let mut sums = [[[0.0; PACKET_SIZE]; 3]; 2];
         let [looks, choices] = row.sampler_packet(tile).pairs(&row.path, Dimension::Gather, 0, 1);
         let Some(max_depth) = tile.settings.render.max_depth.checked_sub(depth + 1) else { return sums };
@@ -90,16 +87,16 @@ impl<const SPLIT: bool> SimdKernel for GatherPhotonsKernel<'_, SPLIT> {
                     // Rescale the random number for reuse.
                     let random = [choices[i], looks[i] / chance];
                     let (light, photon) =
-                        gather_reflected_light::<SPLIT>((row, i), (map, &look), aov, random, simd);
+                        gather_reflected_light((row, i), (map, &look), (aov, splits_lobes), random, simd);
                     let factor = coverage_factor(tile, (row, i), &look, photon, map.radius()) / chance;
                     sum[0] += light[0] * factor;
-                    if SPLIT {
+                    if splits_lobes {
                         sum[1] += light[1] * factor;
                     }
                 }
             }
             set_lane(&mut sums[0], i, sum[0]);
-            if SPLIT {
+            if splits_lobes {
                 set_lane(&mut sums[1], i, sum[1]);
             }
         }
@@ -135,12 +132,12 @@ fn coverage_factor(
 }
 
 /// Returns the light from a map's photons that a vertex reflects toward the viewer, the part of this light
-/// that is from wide lobes (arbitrary unless `SPLIT`), and one of the photons.
+/// that is from wide lobes (arbitrary unless `splits_lobes`), and one of the photons.
 #[inline(always)]
-fn gather_reflected_light<const SPLIT: bool>(
+fn gather_reflected_light(
     (row, i): (&VertexBatch, usize),
     (map, look): (&PhotonMap, &GatherPoint),
-    aov: PathAov,
+    (aov, splits_lobes): (PathAov, bool),
     random: [f32; 2],
     simd: impl Simd,
 ) -> ([Vec3; 2], Option<PhotonPositionAndNormal>) {
@@ -153,15 +150,16 @@ fn gather_reflected_light<const SPLIT: bool>(
             let (irradiance, photon) = map.irradiance_and_chosen_photon(look, random, simd);
             ([f * irradiance; 2], photon)
         }
-        None => gather_with_bsdf_per_photon::<SPLIT>((row, i), (map, look), random, simd),
+        None => gather_with_bsdf_per_photon((row, i), (map, look), splits_lobes, random, simd),
     }
 }
 
 /// Like [`gather_reflected_light`], but evaluates the BSDF for each photon's direction.
 #[inline(always)]
-fn gather_with_bsdf_per_photon<const SPLIT: bool>(
+fn gather_with_bsdf_per_photon(
     (row, i): (&VertexBatch, usize),
     (map, look): (&PhotonMap, &GatherPoint),
+    splits_lobes: bool,
     random: [f32; 2],
     simd: impl Simd,
 ) -> ([Vec3; 2], Option<PhotonPositionAndNormal>) {
@@ -170,7 +168,7 @@ fn gather_with_bsdf_per_photon<const SPLIT: bool>(
         let [shown, wide, all] = row.bsdf.lane_f_by_lobe_set(i, photon.direction);
         let scale = density * row.adjoint_photon_weight(i, photon.direction);
         sum[0] += shown * photon.flux * scale;
-        if SPLIT {
+        if splits_lobes {
             sum[1] += wide * photon.flux * scale;
         }
         // Choose the same photon whichever lobes are shown, so that the AOVs sum to the beauty image.
