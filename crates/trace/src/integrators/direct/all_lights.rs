@@ -19,9 +19,8 @@ use crate::sampling::Dimension;
 use crate::scene::description::ShadowMode;
 use crate::world::SimdKernel;
 
-/// Samples all lights at the vertices in `used`. `MIS` is false if lights are found only by light samples, in
-/// which case no weights are computed.
-pub struct SampleAllLights<'a, const MIS: bool> {
+/// Samples all lights at the vertices in `used`.
+pub struct SampleAllLights<'a> {
     /// The tile being rendered.
     pub tile: &'a TileContext<'a>,
     /// The packet of vertices.
@@ -30,7 +29,7 @@ pub struct SampleAllLights<'a, const MIS: bool> {
     pub used: u32,
     /// The AOV to compute.
     pub aov: PathAov,
-    /// Technique that competes with light samples. Unused if `MIS` is false.
+    /// Technique that competes with light samples.
     pub competing: CompetingTechnique,
     /// Media at the vertices, or `None` if all vertices are in air.
     pub interior_lists: Option<&'a InteriorListPool>,
@@ -49,7 +48,7 @@ struct PendingLight {
     active: u32,
 }
 
-impl<const MIS: bool> SimdKernel for SampleAllLights<'_, MIS> {
+impl SimdKernel for SampleAllLights<'_> {
     type Output = LightSums;
 
     #[inline(always)]
@@ -60,15 +59,15 @@ impl<const MIS: bool> SimdKernel for SampleAllLights<'_, MIS> {
     }
 }
 
-impl<const MIS: bool> SampleAllLights<'_, MIS> {
+impl SampleAllLights<'_> {
     /// Adds the reflected light from all lights.
     #[inline(always)]
     fn sample_all(&self, sums: &mut LightSums, simd: impl Simd) {
-        let render = &self.tile.settings.render;
+        let (render, needs_weights) = (&self.tile.settings.render, self.competing.needs_weights());
         let is_sampled = |light: &Light| !self.only_infinite || light.is_infinite();
         let mut sampler = None;
         for (number, light) in self.tile.world.lights.iter().filter(|(_, light)| is_sampled(light)) {
-            if MIS && self.tile.paths_find_sky && light.is_environment() {
+            if needs_weights && self.tile.paths_find_sky && light.is_environment() {
                 continue;
             }
             // If a single shadow ray determines the visibility of the whole light, defer the sum until the
@@ -104,7 +103,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
                 }
                 let mut fraction = self.splits_lobes.then(|| response.bsdf.wide_fraction());
                 // Apply the MIS weight, unless the light has no extent and is found only by light samples.
-                if MIS && !is_single {
+                if needs_weights && !is_single {
                     let leaves_gloss = self.tile.lobes_find_sky && light.is_environment();
                     let of_light = if leaves_gloss && self.competing.uses_glossy_lobe_rays() {
                         // Use a light-sampling pdf close to 0 so that lobe rays account for all of the light.
