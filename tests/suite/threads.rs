@@ -5,7 +5,7 @@ use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::os::unix::process::CommandExt;
 use std::process::{Command as Process, Stdio};
 
-use super::test_dir::{PROGRAM, SCENE, TestDir};
+use super::test_dir::{PROGRAM, SCENE, TestDir, assert_mentions};
 
 const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 
@@ -83,6 +83,23 @@ fn too_little_memory_is_one_message() {
         let is_sentence = said.starts_with("error: ") && said.lines().count() == 1;
         assert!(is_sentence && said.contains("memory") && !said.contains("ulimit -u"), "{said}");
     }
+}
+
+/// Checking subdivides meshes too, so it respects the memory limit.
+#[test]
+#[cfg(target_os = "linux")]
+fn check_does_not_subdivide_beyond_the_memory_limit() {
+    let dir = TestDir::new();
+    let faces: String = (0..3000).map(|_| "f 1 2 3\n").collect();
+    dir.write("a.obj", format!("v 0 0 0\nv 1 0 0\nv 0 1 0\n{faces}"));
+    let mesh = "\n[[mesh]]\nfile = \"a.obj\"\nmaterial = \"ball\"\nsubdivide = 6\n";
+    dir.write("big.toml", format!("{SCENE}{mesh}"));
+    let mut process = Process::new("bash");
+    process.args(["-c", "ulimit -v 900000 && exec \"$0\" check big.toml", PROGRAM]);
+    let output = process.current_dir(dir.0.path()).output().expect("it runs");
+    let stderr = String::from_utf8(output.stderr).expect("UTF-8");
+    assert_eq!(output.status.code(), Some(1), "{stderr}");
+    assert_mentions(&stderr, &["`subdivide = 6` needs about 938 MiB", "a.obj"]);
 }
 
 /// A part is recognized even if it cannot be opened twice at the same time.

@@ -159,7 +159,10 @@ impl MemoryEstimate {
             Some(("the film" | "the image", _)) => SMALLER_IMAGE,
             Some(("the layers", _)) => "request fewer layers or a smaller image",
             Some((FRAMES, _)) => "render fewer or smaller frames, or numbered files such as a_####.png",
-            Some(("meshes" | "trees", _)) => "use --accel bvh or smaller meshes",
+            Some(("meshes" | "trees", _)) => match plan.scene.render.accel {
+                Accel::Bvh => "use smaller meshes or a lower `subdivide`",
+                Accel::BvhHigh | Accel::KdTree => "use --accel bvh, smaller meshes or a lower `subdivide`",
+            },
             Some(("textures", _)) => "use smaller textures",
             Some(("photons", _)) => "reduce `count` in [photons]",
             Some(_) | None => ALLOW_MORE,

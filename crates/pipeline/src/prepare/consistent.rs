@@ -9,6 +9,7 @@ use crate::control::CancelToken;
 use crate::sink::EventSink;
 use crate::stages::containers::GltfContainers;
 use crate::stages::{AbortReason, FileReadContext, Findings};
+use crate::system::memory::ulimit_or_cgroup_limit;
 use crate::table::StageRecorder;
 use crate::watch::content::{FileHashCache, FilesSeenByRequest};
 
@@ -82,7 +83,8 @@ impl FileReader<'_> {
         containers: &'a GltfContainers,
     ) -> FileReadContext<'a> {
         let FileReader { sink, token, pool, .. } = *self;
-        FileReadContext { sink, token, contents, pool, containers, available_memory: u64::MAX }
+        let available_memory = ulimit_or_cgroup_limit().map_or(u64::MAX, |limit| limit.bytes);
+        FileReadContext { sink, token, contents, pool, containers, available_memory }
     }
 }
 

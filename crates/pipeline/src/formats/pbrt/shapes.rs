@@ -165,6 +165,8 @@ impl SceneWriter<'_> {
             let text = format!("{most} levels are used");
             self.notes.note("many levels of `loopsubdiv`", &text, parameters.span_of("levels"));
         }
+        let text = "subdivided with Loop's weights; pbrt's move vertices with few edges by up to 1/8 of an edge more";
+        self.notes.note("the weights of `loopsubdiv`", text, placement.span.clone());
         // Normals of the control mesh have no effect.
         data.normals.clear();
         data.drop_degenerate_triangles();
