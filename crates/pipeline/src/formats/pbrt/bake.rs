@@ -13,7 +13,7 @@ use super::texture_nodes::{ImageFilter, ImageNode, ImageWrap, TextureNode, UvMap
 use super::textures::{PbrtTextureUse, push_mapping};
 use crate::assets::image::{ColorEncoding, ColorTransferFunction, ImageLimits, load_and_hash};
 use crate::assets::{AssetError, Companion};
-use crate::control::ignore_progress;
+use crate::control::{CancelToken, ignore_progress};
 use crate::formats::foreign::import::TableEntries;
 use crate::materials::texels::Texels;
 use crate::math::color::luminance;
@@ -83,6 +83,7 @@ impl SceneWriter<'_> {
     pub(super) fn baked_keys(&mut self, node: &TextureNode, usage: PbrtTextureUse) -> (TableEntries, String) {
         let mut leaves = Vec::new();
         collect_leaves(node, &mut leaves);
+        let first_file = leaves.iter().find_map(|leaf| leaf.as_image()).map(|image| &image.file);
         let mut images = Images::new();
         for leaf in &leaves {
             if let TextureNode::Image(image) = leaf {
@@ -94,20 +95,13 @@ impl SceneWriter<'_> {
         }
         let (domain, is_exact) = domain_of(&leaves, &images);
         if !is_exact {
-            let span = leaves.iter().find_map(|leaf| match leaf {
-                TextureNode::Image(image) => Some(image.file.span.clone()),
-                _ => None,
-            });
             let text = "the combination repeats after one unit";
-            self.notes.substitute("textures with different scales", text, span.unwrap_or(0..0));
+            let span = first_file.map_or(0..0, |file| file.span.clone());
+            self.notes.substitute("textures with different scales", text, span);
         }
         let is_number = usage != PbrtTextureUse::Color;
-        let pixels = bake(node, &images, &domain, usage);
-        let name = leaves.iter().find_map(|leaf| match leaf {
-            TextureNode::Image(image) => Some(stem(&image.file.text)),
-            _ => None,
-        });
-        let name = name.unwrap_or_else(|| "texture".to_owned());
+        let pixels = bake(node, &images, &domain, usage, self.token);
+        let name = first_file.map_or_else(|| "texture".to_owned(), |file| stem(&file.text));
         let file = self.add_generated_file(&name, "pfm", pixels.encode_pfm(is_number));
         let mut keys: TableEntries = vec![("file", file.into())];
         if domain.wrap == ImageWrap::Clamp {
@@ -170,20 +164,14 @@ fn image_key(image: &ImageNode) -> ImageKey {
 /// Adds all parts of a texture that depend on (u, v).
 fn collect_leaves<'a>(node: &'a TextureNode, leaves: &mut Vec<&'a TextureNode>) {
     match node {
-        TextureNode::Constant(_) | TextureNode::Noise { .. } => {}
-        TextureNode::Image(_) => leaves.push(node),
-        TextureNode::Checker(_, parts) => {
-            leaves.push(node);
-            parts.iter().for_each(|part| collect_leaves(part, leaves));
-        }
-        TextureNode::Bilinear(_, parts) => {
-            leaves.push(node);
-            parts.iter().for_each(|part| collect_leaves(part, leaves));
-        }
-        TextureNode::Product(parts) => parts.iter().for_each(|part| collect_leaves(part, leaves)),
-        TextureNode::Mix(parts) => parts.iter().for_each(|part| collect_leaves(part, leaves)),
-        TextureNode::Power(part, _) => collect_leaves(part, leaves),
+        TextureNode::Image(_) | TextureNode::Checker(..) | TextureNode::Bilinear(..) => leaves.push(node),
+        TextureNode::Constant(_)
+        | TextureNode::Noise { .. }
+        | TextureNode::Product(_)
+        | TextureNode::Mix(_)
+        | TextureNode::Power(..) => {}
     }
+    node.parts().iter().for_each(|part| collect_leaves(part, leaves));
 }
 
 /// The mapping of a leaf, its period in mapped units, and its resolution per mapped unit.
@@ -232,18 +220,34 @@ fn domain_of(leaves: &[&TextureNode], images: &Images) -> (Domain, bool) {
     let is_clamped = |leaf: &&TextureNode| match leaf {
         TextureNode::Image(image) => image.wrap != ImageWrap::Repeat,
         TextureNode::Bilinear(..) => true,
-        _ => false,
+        TextureNode::Constant(_)
+        | TextureNode::Checker(..)
+        | TextureNode::Product(_)
+        | TextureNode::Mix(_)
+        | TextureNode::Power(..)
+        | TextureNode::Noise { .. } => false,
     };
     let clamps = has_same_mapping && period == 1.0 && !leaves.is_empty() && leaves.iter().all(is_clamped);
     let wrap = if clamps { ImageWrap::Clamp } else { ImageWrap::Repeat };
     (Domain { mapping, size: [size.x as usize, size.y as usize], wrap }, is_exact)
 }
 
-/// Evaluates a texture at all texel centers. Heights are shifted so that none is negative.
-fn bake(node: &TextureNode, images: &Images, domain: &Domain, usage: PbrtTextureUse) -> Pixels {
+/// Evaluates a texture at all texel centers. Heights are shifted so that none is negative. After
+/// cancellation, the remaining rows are black.
+fn bake(
+    node: &TextureNode,
+    images: &Images,
+    domain: &Domain,
+    usage: PbrtTextureUse,
+    token: &CancelToken,
+) -> Pixels {
     let [width, height] = domain.size;
     let row_values = |row: usize| {
+        let is_canceled = token.is_canceled();
         (0..width).map(move |column| {
+            if is_canceled {
+                return Vec3::ZERO;
+            }
             let x = (column as f64 + 0.5) / width as f64;
             let y = 1.0 - (row as f64 + 0.5) / height as f64;
             let uv = (DVec2::new(x, y) - domain.mapping.offset) / domain.mapping.scale;
@@ -334,7 +338,8 @@ mod tests {
         let mut leaves = Vec::new();
         collect_leaves(node, &mut leaves);
         let (domain, is_exact) = domain_of(&leaves, &images());
-        (bake(node, &images(), &domain, PbrtTextureUse::Number), domain, is_exact)
+        let pixels = bake(node, &images(), &domain, PbrtTextureUse::Number, &CancelToken::new());
+        (pixels, domain, is_exact)
     }
 
     #[test]

@@ -13,6 +13,7 @@ use crate::assets::{AssetError, Companion, LoadedMesh, read_gzip_file};
 use crate::control::ignore_progress;
 use crate::formats::foreign::transform::matrix_value;
 use crate::math::DMat4;
+use crate::system::file::FileStamp;
 
 /// Maximum size of a decompressed mesh.
 const MAX_MESH_BYTES: u64 = 4 << 30;
@@ -45,8 +46,18 @@ impl SceneWriter<'_> {
         if self.is_tolerated_missing(&file, "mesh", "skipped") {
             return Ok(());
         }
-        let header = read_header(&self.asset_path(&file.text));
         let is_compressed = is_gzip(&file.text);
+        if !is_compressed && !file.text.to_lowercase().ends_with(".ply") {
+            let error = PbrtError::new(file.span, "`plymesh` reads PLY files");
+            return Err(error.with_help("the file name must end with .ply or .ply.gz"));
+        }
+        let path = self.asset_path(&file.text);
+        self.companions.push(Companion {
+            path: path.clone(),
+            hash: None,
+            stamp: FileStamp::from_path(&path),
+        });
+        let header = read_header(&path);
         let must_read = header.as_ref().is_some_and(|header| {
             header.size < SMALL_FILE_BYTES
                 || placement.is_reversed

@@ -14,6 +14,8 @@ use crate::scene::sanitize::escape_and_truncate;
 
 /// Maximum depth of textures that use textures.
 const MAX_DEPTH: usize = 32;
+/// Maximum number of textures that one texture combines. A texture counts once for each use.
+const MAX_NODES: usize = 256;
 
 /// Whether a texture is a color or a number. pbrt keeps them apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -105,6 +107,36 @@ impl TextureNode {
             | Self::Power(..)
             | Self::Noise { .. } => None,
         }
+    }
+
+    /// The image, or `None` for other textures.
+    pub(super) fn as_image(&self) -> Option<&ImageNode> {
+        match self {
+            Self::Image(image) => Some(image),
+            Self::Constant(_)
+            | Self::Checker(..)
+            | Self::Product(_)
+            | Self::Mix(_)
+            | Self::Bilinear(..)
+            | Self::Power(..)
+            | Self::Noise { .. } => None,
+        }
+    }
+
+    /// The textures that this one combines.
+    pub(super) fn parts(&self) -> &[Self] {
+        match self {
+            Self::Constant(_) | Self::Image(_) | Self::Noise { .. } => &[],
+            Self::Checker(_, parts) | Self::Product(parts) => &**parts,
+            Self::Mix(parts) => &**parts,
+            Self::Bilinear(_, parts) => &**parts,
+            Self::Power(part, _) => std::slice::from_ref(part),
+        }
+    }
+
+    /// Number of textures that are combined. A texture counts once for each use.
+    fn node_count(&self) -> usize {
+        1 + self.parts().iter().map(Self::node_count).sum::<usize>()
     }
 
     /// Multiplies two textures.
@@ -216,6 +248,11 @@ impl<'a> TextureResolver<'a> {
             return Err(PbrtError::new(name.span.clone(), message).with_suggestion(near));
         };
         let node = self.resolve(texture, value, notes, depth)?;
+        // Without a limit, a texture that others use several times would be evaluated exponentially often.
+        if node.node_count() > MAX_NODES {
+            let message = format!("this texture combines more than {MAX_NODES} textures");
+            return Err(PbrtError::new(name.span.clone(), message));
+        }
         self.known.insert(key, node.clone());
         Ok(node)
     }

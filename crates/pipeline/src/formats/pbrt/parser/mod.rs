@@ -95,6 +95,8 @@ pub(super) struct Parser<'a> {
     folder: PathBuf,
     state: GraphicsState,
     stack: Vec<(GraphicsState, BlockKind, Range<usize>)>,
+    /// Number of blocks that were open before the innermost imported file, which cannot end them.
+    blocks_before_import: usize,
     coordinate_systems: HashMap<String, MotionTransform>,
     is_world: bool,
     /// The object that is being defined.
@@ -124,6 +126,7 @@ pub(super) fn parse<'a>(
         folder: path.parent().unwrap_or(Path::new("")).to_owned(),
         state: GraphicsState::default(),
         stack: Vec::new(),
+        blocks_before_import: 0,
         coordinate_systems: HashMap::new(),
         is_world: false,
         object: None,
@@ -227,13 +230,16 @@ impl Parser<'_> {
                 return Ok(Err(PbrtError::new(name.span.clone(), unreadable.to_string()).with_help(help)));
             }
         };
-        let before = is_import.then(|| (self.state.clone(), self.stack.len()));
+        let before = is_import.then(|| {
+            let blocks = std::mem::replace(&mut self.blocks_before_import, self.stack.len());
+            (self.state.clone(), blocks)
+        });
         self.open_files.push(identity);
         let parsed = self.parse_text(&text, base);
         self.open_files.pop();
-        if let Some((state, depth)) = before {
-            self.stack.truncate(depth);
-            self.state = state;
+        if let Some((state, blocks)) = before {
+            self.stack.truncate(self.blocks_before_import);
+            (self.state, self.blocks_before_import) = (state, blocks);
         }
         parsed.map(|_| Ok(()))
     }
@@ -393,7 +399,8 @@ impl Parser<'_> {
             BlockKind::Attribute => ("AttributeBegin", "AttributeEnd"),
             BlockKind::Object => ("ObjectBegin", "ObjectEnd"),
         };
-        match self.stack.pop() {
+        let is_open = self.stack.len() > self.blocks_before_import;
+        match is_open.then(|| self.stack.pop()).flatten() {
             Some((state, open, _)) if open == kind => self.state = state,
             Some(other) => {
                 self.stack.push(other);

@@ -4,7 +4,7 @@ use super::*;
 
 /// Broken scenes: the text after the camera and `WorldBegin`, the underlined text, and a part of the message.
 /// `§` marks the start of the underlined text.
-const WORLDS: [(&str, &str); 36] = [
+const WORLDS: [(&str, &str); 37] = [
     ("\n§Shap \"sphere\"", "unknown directive"),
     ("§WorldEnd", "pbrt-v3"),
     ("Shape §sphere", "double quotes"),
@@ -43,6 +43,7 @@ const WORLDS: [(&str, &str); 36] = [
     ("Rotate 90 0 0 §x", "expected a number"),
     ("§Rotate 90 0 0 0", "no direction"),
     ("Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0] \"integer indices\" §[0 1 3]", "out of range"),
+    ("Shape \"plymesh\" \"string filename\" §\"a.gltf\"", "reads PLY files"),
     ("§Camera \"perspective\"", "must precede `WorldBegin`"),
 ];
 
@@ -101,6 +102,36 @@ fn errors_in_included_files_name_the_file() {
     let errors = folder.read().expect_err("errors");
     assert!(errors[0].path.ends_with("a.pbrt"), "{errors:?}");
     assert_eq!(errors[0].place.as_ref().map(|place| place.span.start), Some(8));
+}
+
+#[test]
+fn imported_files_cannot_end_outer_blocks() {
+    let text = format!("{CAMERA}WorldBegin\nAttributeBegin\nImport \"a.pbrt\"\nAttributeEnd\n");
+    let folder = SceneFolder::new(&text);
+    folder.write("a.pbrt", b"Shape \"sphere\"\nAttributeEnd\n");
+    let errors = folder.read().expect_err("errors");
+    assert!(errors[0].path.ends_with("a.pbrt") && errors.len() == 1, "{errors:?}");
+    assert_eq!(errors[0].place.as_ref().map(|place| place.span.start), Some(15));
+}
+
+#[test]
+fn shared_textures_do_not_grow_exponentially() {
+    let double = |index: usize| {
+        format!(
+            "Texture \"{}\" \"spectrum\" \"mix\" \"texture tex1\" \"{index}\" \"texture tex2\" \"{index}\"\n",
+            index + 1
+        )
+    };
+    let chain = |length: usize| {
+        let all: String = (0..length).map(double).collect();
+        format!(
+            "{CAMERA}WorldBegin\nTexture \"0\" \"spectrum\" \"bilerp\"\n{all}\
+             Material \"diffuse\" \"texture reflectance\" \"{length}\"\nShape \"sphere\"\n"
+        )
+    };
+    assert!(SceneFolder::new(&chain(5)).read().is_ok());
+    let errors = SceneFolder::new(&chain(30)).read().expect_err("errors");
+    assert!(errors[0].message.contains("combines more than"), "{errors:?}");
 }
 
 #[test]
