@@ -89,6 +89,13 @@ fn errors_underline_the_foreign_text() {
         (with_text.message.as_str(), place.label.as_str()),
         ("`radius` must be greater than 0", "found -2")
     );
+    // The underlined text may be something else than the value, such as the name of its object.
+    let mut named = built(2.0, SOURCE);
+    named.start_table("camera");
+    named.set_span_for_next_values(0..6);
+    named.set("fov", -2.0);
+    let label = first_error(named, &[]).place.map(|place| place.label);
+    assert_eq!(label.as_deref(), Some("found -2"));
     let without = first_error(built(-2.0, ""), &["render.width=9"]);
     assert_eq!(without.message, format!("{}; {}", with_text.message, place.label));
     assert_eq!((without.place, without.path), (None, with_text.path));

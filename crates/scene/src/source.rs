@@ -98,6 +98,11 @@ impl SceneText {
         !self.is_foreign || *span != (0..0)
     }
 
+    /// Whether a value with this span is from a foreign file, so that the text there may not be the value.
+    pub(super) fn is_foreign_span(&self, span: &Range<usize>) -> bool {
+        self.is_foreign && !self.is_span_in_set_arg(span)
+    }
+
     /// Marks the text as the text of a foreign file, which is empty if the file is not text. `files` are the
     /// files that it consists of, if there are several.
     pub(super) fn mark_foreign(self, files: Arc<[SourceFile]>) -> Self {

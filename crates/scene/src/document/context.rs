@@ -150,6 +150,11 @@ impl<'a> FileContext<'a> {
         self.source.full_text().get(span.clone()).unwrap_or_default()
     }
 
+    /// The text of a value, or `None` if the value is not in a text or may be written differently there.
+    pub(super) fn value_text(&self, span: &Range<usize>) -> Option<&str> {
+        Some(self.span_text(span)).filter(|text| !text.is_empty() && !self.source.is_foreign_span(span))
+    }
+
     /// Calls `look` to search a list for a similar name, unless the file's search limit has been reached. The
     /// limit exists because the cost of a search is linear in the length of the list, and files with many
     /// wrong names usually repeat the same mistake.

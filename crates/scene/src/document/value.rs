@@ -6,12 +6,12 @@ pub(super) use super::super::toml::{TomlValue, Value};
 use super::context::FileContext;
 
 /// Describes a value for use in messages, as in `found the string "a"`. Quotes the text, or formats the value
-/// if it is not in a text.
+/// if it is not in a text or is from a foreign file.
 pub(super) fn describe_value(context: &FileContext<'_>, value: Value<'_>) -> String {
     const MAX_LENGTH: usize = 32;
-    let written = || match context.span_text(&value.span()) {
-        "" => escape_and_truncate(&format_value(value), MAX_LENGTH),
-        text => escape_and_truncate(text, MAX_LENGTH),
+    let written = || match context.value_text(&value.span()) {
+        None => escape_and_truncate(&format_value(value), MAX_LENGTH),
+        Some(text) => escape_and_truncate(text, MAX_LENGTH),
     };
     match value.decode() {
         TomlValue::String(_) => format!("the string {}", written()),
