@@ -208,9 +208,9 @@ const BROKEN: &[(&str, &[ExpectedDiagnostic])] = &[
                 11,
                 "`samples` must be a whole number between 1 and 4294967295; found 99999999999999999999999",
             ),
-            (12, 11, "`center` must be less than 1e18 in magnitude; found 1e19"),
-            (12, 20, "`center` must be less than 1e18 in magnitude; found 1e999"),
-            (13, 10, "`radius` must be less than 1e18 in magnitude; found 1701411834604692317316873037158…"),
+            (12, 11, "`center` must be at most 1e18 in magnitude; found 1e19"),
+            (12, 20, "`center` must be at most 1e18 in magnitude; found 1e999"),
+            (13, 10, "`radius` must be at most 1e18 in magnitude; found 1701411834604692317316873037158…"),
         ],
     ),
     (

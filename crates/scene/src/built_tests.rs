@@ -107,7 +107,7 @@ fn errors_underline_the_foreign_text() {
     let messages: Vec<_> = load(wrong, &[]).expect_err("errors").into_iter().map(|one| one.message).collect();
     let expected = [
         "`fov` must be a number; found the string \"wide\"",
-        "`aperture` must be less than 1e18 in magnitude; found 1e300",
+        "`aperture` must be at most 1e18 in magnitude; found 1e300",
         "`name` must not be a number",
     ];
     assert_eq!(messages, expected);

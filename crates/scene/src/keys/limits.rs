@@ -32,18 +32,17 @@ impl Limits {
             return Some("must be a finite number".to_owned());
         }
         if number.abs() > MAX_MAGNITUDE {
-            return Some("must be less than 1e18 in magnitude".to_owned());
+            return Some("must be at most 1e18 in magnitude".to_owned());
         }
-        match self {
-            Self::LengthOrZero if is_nonzero_but_too_short(number) => {
-                Some("must be 0, or at least 1e-18".to_owned())
+        if is_nonzero_but_too_short(number) {
+            if matches!(self, Self::LengthOrZero) {
+                return Some("must be 0, or at least 1e-18".to_owned());
             }
-            Self::Length | Self::NotZero if is_nonzero_but_too_short(number) => {
-                Some("must be more than 1e-18 in magnitude".to_owned())
+            if matches!(self, Self::Length | Self::NotZero) {
+                return Some("must be more than 1e-18 in magnitude".to_owned());
             }
-            _ if self.contains(number) => None,
-            _ => Some(self.requirement_text()),
         }
+        (!self.contains(number)).then(|| self.requirement_text())
     }
 
     fn contains(self, number: f64) -> bool {
