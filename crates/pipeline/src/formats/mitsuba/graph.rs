@@ -7,6 +7,7 @@ use std::ops::Range;
 use super::property::{PropertyValue, SpectrumValue, TransformValue};
 use super::values::{self, ValueError, parse_float, parse_numbers, parse_point, property_name};
 use super::xml::{Attribute, Element, MAX_ERRORS, shorten};
+use crate::control::CancelToken;
 use crate::math::{DMat4, DVec3};
 use crate::scene::SourceFiles;
 use crate::scene::diagnostic::{Diagnostic, Severity};
@@ -135,6 +136,7 @@ pub(super) struct GraphBuilder<'a> {
     references: Vec<Reference>,
     files: &'a SourceFiles,
     pub(super) errors: Vec<Diagnostic>,
+    token: &'a CancelToken,
 }
 
 /// A reference that has not been resolved yet.
@@ -150,9 +152,9 @@ struct Reference {
 const UNRESOLVED: ObjectIndex = usize::MAX;
 
 impl<'a> GraphBuilder<'a> {
-    pub(super) fn new(files: &'a SourceFiles) -> Self {
+    pub(super) fn new(files: &'a SourceFiles, token: &'a CancelToken) -> Self {
         let (graph, ids, references, errors) = Default::default();
-        Self { graph, ids, references, files, errors }
+        Self { graph, ids, references, files, errors, token }
     }
 
     fn error(&mut self, span: Range<usize>, message: impl Into<String>, help: Option<String>) {
@@ -161,7 +163,8 @@ impl<'a> GraphBuilder<'a> {
         }
     }
 
-    /// Builds the graph, whose object 0 is the scene. Returns `None` if there are errors.
+    /// Builds the graph, whose object 0 is the scene. Returns the errors if there are any. The graph is
+    /// incomplete if the token is canceled.
     pub(super) fn build(mut self, root: &Element) -> Result<SceneGraph, Vec<Diagnostic>> {
         self.add_object(root, ObjectKind::Scene);
         self.resolve_references();
@@ -208,6 +211,9 @@ impl<'a> GraphBuilder<'a> {
 
     /// Adds a nested object, a reference or a property to an object.
     fn add_member(&mut self, parent: ObjectIndex, element: &Element) {
+        if self.token.check_pause_and_cancel().is_err() {
+            return;
+        }
         let tag = element.tag.as_str();
         let is_plugin_spectrum = tag == "spectrum" && element.attribute("type").is_some();
         let kind = OBJECT_TAGS.iter().find(|(name, _)| *name == tag).map(|(_, kind)| *kind);
@@ -379,6 +385,7 @@ impl<'a> GraphBuilder<'a> {
         for Reference { parent, child, id, span } in std::mem::take(&mut self.references) {
             match self.ids.get(&id) {
                 Some(&target) => self.graph.objects[parent].children[child].target = target,
+                None if self.errors.len() >= MAX_ERRORS => return,
                 None => {
                     let near = nearest_name(&id, self.ids.keys().map(String::as_str).take(4096));
                     let help = near.map(|near| format!("did you mean `{near}`?"));

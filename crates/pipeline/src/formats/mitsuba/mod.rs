@@ -68,7 +68,9 @@ fn read_scene(
     let Some(root) = root.filter(|_| errors.is_empty()) else {
         return fail(errors, sources.companions);
     };
-    let graph = match GraphBuilder::new(&sources.files).build(&root) {
+    let built = GraphBuilder::new(&sources.files, token).build(&root);
+    token.check_pause_and_cancel()?;
+    let graph = match built {
         Ok(graph) => graph,
         Err(errors) => return fail(errors, sources.companions),
     };
@@ -102,6 +104,7 @@ fn read_scene(
             | ObjectKind::Volume => {}
         }
     }
+    token.check_pause_and_cancel()?;
     let SceneReader { errors, notes, mut document, companions: found, asset_names, .. } = reader;
     let companions: Vec<Companion> = sources.companions.into_iter().chain(found).collect();
     if !errors.is_empty() {

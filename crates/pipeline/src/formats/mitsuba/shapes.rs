@@ -63,6 +63,9 @@ impl<'a> SceneReader<'a> {
     /// Adds a shape. Returns whether anything was added.
     pub(super) fn add_shape(&mut self, index: ObjectIndex, target: ShapeTarget<'_>) -> bool {
         let object = self.object(index);
+        if !self.count_shape(object) {
+            return false;
+        }
         if target.depth > MAX_DEPTH {
             self.error(object.span.clone(), "shapes are nested too deeply", None);
             return false;
@@ -276,18 +279,10 @@ impl<'a> SceneReader<'a> {
 
     /// Whether the material of a shape depends on its texture coordinates or tangents.
     fn shape_uses_coordinates(&self, object: &'a PluginInstance) -> bool {
-        let mut pending: Vec<ObjectIndex> = object.children.iter().map(|child| child.target).collect();
-        while let Some(index) = pending.pop() {
-            let inner = self.object(index);
-            if inner.kind == ObjectKind::Texture || inner.properties.iter().any(|one| one.name == "alpha_u") {
-                return true;
-            }
-            if pending.len() > 10_000 {
-                return true;
-            }
-            pending.extend(inner.children.iter().map(|child| child.target));
-        }
-        false
+        let children = object.children.iter().map(|child| child.target);
+        self.any_nested(children, |inner| {
+            inner.kind == ObjectKind::Texture || inner.properties.iter().any(|one| one.name == "alpha_u")
+        })
     }
 
     fn add_cylinder(&mut self, object: &'a PluginInstance, target: ShapeTarget<'_>) -> bool {

@@ -106,6 +106,7 @@ impl<'a> XmlLoader<'a> {
         }
         self.parameters.sort_by_key(|(name, _)| std::cmp::Reverse(name.len()));
         self.substitute_in_element(&mut root);
+        self.token.check_pause_and_cancel()?;
         Ok(Some(root))
     }
 
@@ -167,6 +168,7 @@ impl<'a> XmlLoader<'a> {
         source: &FileSource<'_>,
         depth: usize,
     ) -> Result<Option<Element>, AssetError> {
+        self.token.check_pause_and_cancel()?;
         let span = tag_span(source.text, node, source.start);
         if depth > MAX_DEPTH {
             let help = "flatten the scene".to_owned();
@@ -288,6 +290,9 @@ impl<'a> XmlLoader<'a> {
     }
 
     fn substitute_in_element(&mut self, element: &mut Element) {
+        if self.token.is_canceled() {
+            return;
+        }
         for attribute in &mut element.attributes {
             if !attribute.value.contains('$') {
                 continue;
@@ -298,7 +303,7 @@ impl<'a> XmlLoader<'a> {
             if is_too_long || self.substituted_bytes > MAX_ADDED_BYTES {
                 attribute.value = String::new();
                 if self.errors.len() >= MAX_ERRORS {
-                    continue;
+                    return;
                 }
                 self.errors.push(self.reader.files.diagnostic(
                     Severity::Error,

@@ -3,6 +3,7 @@
 mod broken;
 mod facts;
 mod fuzz;
+mod limits;
 
 use std::path::{Path, PathBuf};
 
