@@ -47,8 +47,11 @@ impl SceneReader<'_> {
                 self.error(span.clone(), format!("{kind} not found: {}", shorten(name)), Some(help));
             }
             MissingAssetMode::Note => {
-                let text =
-                    if kind == "image" { "not found; replaced by gray" } else { "not found; left out" };
+                let text = match kind {
+                    "image" => "not found; replaced by gray",
+                    "spectrum" => "not found; replaced by the default value",
+                    _ => "not found; left out",
+                };
                 self.notes.substitute_light(&format!("{kind} {}", shorten(name)), text, span.clone());
             }
         }

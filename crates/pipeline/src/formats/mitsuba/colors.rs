@@ -155,7 +155,7 @@ impl<'a> SceneReader<'a> {
             SpectrumValue::Sampled(spectrum) => Some(sampled_color(spectrum, role)),
             SpectrumValue::Blackbody(kelvin, scale) => Some(blackbody_color(*kelvin) * *scale),
             SpectrumValue::File(name) => {
-                let path = self.find_file(name, span)?;
+                let path = self.asset_path(name, span, "spectrum")?;
                 let read = crate::assets::read_text_file(&path, 16 << 20, self.token);
                 let text = match read {
                     Ok(file) => {
