@@ -93,6 +93,10 @@ pub(super) struct SceneReader<'a> {
     pub(super) plastic_coats: HashMap<(u64, Option<u64>, bool), PlasticCoat>,
     /// Names of the materials in the blends of the current shape. `None` marks errors.
     pub(super) blend_parts: HashMap<BlendPartKey, Option<String>>,
+    /// Files in `companions`.
+    pub(super) watched_files: HashSet<PathBuf>,
+    /// Inspected properties of files, by path and part.
+    pub(super) inspected_files: HashMap<(PathBuf, Option<i64>), bool>,
     /// Number of materials in the document.
     pub(super) material_count: usize,
     /// Number of shapes converted, including those that contain shapes.
@@ -138,6 +142,8 @@ impl<'a> SceneReader<'a> {
             black: None,
             plastic_coats: HashMap::new(),
             blend_parts: HashMap::new(),
+            watched_files: HashSet::new(),
+            inspected_files: HashMap::new(),
             material_count: 0,
             shape_count: 0,
             has_stopped: false,

@@ -232,14 +232,16 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Whether no face of a mesh has an area. Only small files are checked, because such meshes are small.
-    fn is_mesh_without_area(&self, path: &Path, part: Option<i64>) -> bool {
+    fn is_mesh_without_area(&mut self, path: &Path, part: Option<i64>) -> bool {
         const MAX_BYTES: u64 = 4096;
         if !std::fs::metadata(path).is_ok_and(|metadata| metadata.len() <= MAX_BYTES) {
             return false;
         }
-        let part = part.and_then(|part| u32::try_from(part).ok());
-        let loaded = self.containers.load_any_mesh(path, part, &ignore_progress, self.token);
-        matches!(loaded, Err(AssetError::Malformed { reason, .. }) if reason.starts_with(NO_USABLE_FACE))
+        self.inspect_watched(path, part, |reader| {
+            let part = part.and_then(|part| u32::try_from(part).ok());
+            let loaded = reader.containers.load_any_mesh(path, part, &ignore_progress, reader.token);
+            matches!(loaded, Err(AssetError::Malformed { reason, .. }) if reason.starts_with(NO_USABLE_FACE))
+        })
     }
 
     fn add_sphere(&mut self, object: &'a PluginInstance, target: ShapeTarget<'_>) -> bool {

@@ -201,12 +201,12 @@ impl<'a> SceneReader<'a> {
         let Some((name, span)) = self.text(object, "filename") else { return false };
         let Some(path) = self.find_file(name, &span) else { return false };
         match extension(&path.to_string_lossy()).as_str() {
-            "png" | "apng" => {
+            "png" | "apng" => self.inspect_watched(&path, None, |_| {
                 use std::io::Read;
                 let mut start = [0; 33];
                 let read = std::fs::File::open(&path).and_then(|mut file| file.read_exact(&mut start));
                 read.is_ok() && matches!(start[25], 4 | 6)
-            }
+            }),
             "tga" | "webp" | "exr" | "bmp" => true,
             _ => false,
         }

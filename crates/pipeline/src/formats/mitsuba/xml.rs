@@ -255,10 +255,17 @@ impl<'a> XmlLoader<'a> {
         name.value = substitute(&name.value, &self.parameters);
         let (span, name) = (name.span.clone(), name.value.clone());
         let near = file.parent().unwrap_or(Path::new("")).join(&name);
-        let candidates =
-            std::iter::once(near.clone()).chain(self.folders.iter().rev().map(|folder| folder.join(&name)));
-        let Some(found) = candidates.into_iter().find(|path| path.is_file()) else {
-            self.reader.watch_missing(near);
+        let others = self.folders.iter().rev().map(|folder| folder.join(&name));
+        let mut found = None;
+        for candidate in std::iter::once(near).chain(others) {
+            if candidate.is_file() {
+                found = Some(candidate);
+                break;
+            }
+            // The file may be created in any of the folders.
+            self.reader.watch_missing(candidate);
+        }
+        let Some(found) = found else {
             let help = "files are searched next to this file, then in the folders of <path>".to_owned();
             self.error(span, format!("included file not found: {}", shorten(&name)), Some(help));
             return Ok(());

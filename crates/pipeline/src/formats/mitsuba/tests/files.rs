@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::{Bench, has_line, scene};
+use super::{Bench, OBJ, has_line, png, scene};
 use crate::formats::foreign::MissingAssetMode;
 
 /// Paths of the watched files.
@@ -28,4 +28,49 @@ fn missing_spectra_are_errors_or_substitutions() {
     has_line(&bench.toml(), "diffuse = 0.5");
     let notes = bench.notes();
     assert!(notes.iter().any(|note| note.contains("spectrum no.spd: not found")), "{notes:?}");
+}
+
+#[test]
+fn skipped_meshes_are_watched() {
+    let bench = scene("<shape type=\"obj\"><string name=\"filename\" value=\"a.obj\"/></shape>");
+    bench.write("a.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n");
+    assert!(bench.notes().iter().any(|note| note.contains("without area")), "{:?}", bench.notes());
+    assert_eq!(watched(&bench), [bench.path("a.obj")]);
+    bench.write("a.obj", OBJ);
+    has_line(&bench.toml(), "[[mesh]]");
+}
+
+#[test]
+fn images_of_masks_are_watched() {
+    let bench = scene(
+        r#"<shape type="sphere"><bsdf type="mask"><bsdf type="diffuse"/><texture type="bitmap" name="opacity">
+        <string name="filename" value="a.png"/></texture></bsdf></shape>"#,
+    );
+    for has_alpha in [false, true] {
+        bench.write("a.png", png(has_alpha));
+        assert_eq!(bench.toml().contains("channel = \"r\""), has_alpha);
+        assert_eq!(watched(&bench), [bench.path("a.png")]);
+    }
+}
+
+#[test]
+fn all_places_of_missing_files_are_watched() {
+    let mesh = "<shape type=\"obj\"><string name=\"filename\" value=\"a.obj\"/></shape>";
+    let bench = scene(&format!("<path value=\"p\"/><path value=\"q\"/>{mesh}"));
+    bench.write("p/other", "").write("q/other", "");
+    let places = ["q/a.obj", "p/a.obj", "a.obj"].map(|name| bench.path(name));
+    assert_eq!(watched(&bench), places);
+    // A file that is created in a folder with precedence replaces the one that was found.
+    bench.write("p/a.obj", OBJ);
+    assert_eq!(watched(&bench), [bench.path("q/a.obj"), bench.path("p/a.obj")]);
+}
+
+#[test]
+fn all_places_of_missing_includes_are_watched() {
+    let bench = scene("<path value=\"p\"/><path value=\"q\"/><include filename=\"a.xml\"/>");
+    bench.write("p/other", "").write("q/other", "");
+    let paths = watched(&bench);
+    for place in ["a.xml", "p/a.xml", "q/a.xml"] {
+        assert!(paths.contains(&bench.path(place)), "{place}: {paths:?}");
+    }
 }
