@@ -104,12 +104,13 @@ impl SceneReader<'_> {
             .map(|c| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' })
             .take(60)
             .collect();
-        // Names of numbers are allowed for files, so use the extension to make them unique.
-        let unique = self.used_asset_names.make_unique(&format!("{plain}.{extension}"), "asset");
-        let name = match unique.strip_prefix(&format!("{plain}.{extension}")) {
-            Some("") | None => unique.clone(),
-            Some(number) => format!("{plain}{number}.{extension}"),
-        };
+        // The number precedes the extension. The result may be the name of another file.
+        let mut name = format!("{plain}.{extension}");
+        let mut next = 2;
+        while !self.used_asset_names.insert(name.clone()) {
+            name = format!("{plain}_{next}.{extension}");
+            next += 1;
+        }
         let name = format!("{folder}/{name}");
         self.asset_names.insert(path.to_owned(), name.clone());
         name

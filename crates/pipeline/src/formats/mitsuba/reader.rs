@@ -83,7 +83,7 @@ pub(super) struct SceneReader<'a> {
     pub(super) groups: HashMap<ObjectIndex, Option<String>>,
     /// Names of the files that an import writes, by source.
     pub(super) asset_names: BTreeMap<PathBuf, String>,
-    pub(super) used_asset_names: UsedNames,
+    pub(super) used_asset_names: HashSet<String>,
     /// Properties reported as unused.
     pub(super) reported_unused: HashSet<ObjectIndex>,
     pub(super) has_environment: bool,
@@ -136,7 +136,7 @@ impl<'a> SceneReader<'a> {
             textures: HashMap::new(),
             groups: HashMap::new(),
             asset_names: BTreeMap::new(),
-            used_asset_names: UsedNames::default(),
+            used_asset_names: HashSet::new(),
             reported_unused: HashSet::new(),
             has_environment: false,
             black: None,

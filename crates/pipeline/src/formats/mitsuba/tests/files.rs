@@ -74,3 +74,27 @@ fn all_places_of_missing_includes_are_watched() {
         assert!(paths.contains(&bench.path(place)), "{place}: {paths:?}");
     }
 }
+
+#[test]
+fn copied_files_have_different_names() {
+    let names = ["a/t.obj", "b/t.obj", "t_2.obj", "c/t.obj"];
+    let shape = |name: &str| {
+        format!("<shape type=\"obj\"><string name=\"filename\" value=\"{name}\"/></shape>")
+    };
+    let bench = scene(&names.map(shape).concat());
+    for (index, name) in names.iter().enumerate() {
+        bench.write(name, format!("{OBJ}# {index}\n"));
+    }
+    let imported = bench.import();
+    let mut copies: Vec<_> = imported.files.iter().map(|(name, _)| name.clone()).collect();
+    copies.sort();
+    copies.dedup();
+    assert_eq!(copies.len(), names.len(), "{copies:?}");
+    let text = imported.document.to_toml();
+    let refers = |(name, bytes): &(PathBuf, Vec<u8>)| {
+        let index: usize = (0..names.len()).find(|index| bytes.ends_with(format!("# {index}\n").as_bytes())).expect("a copy");
+        let files: Vec<_> = text.lines().filter(|line| line.starts_with("file = ")).collect();
+        files[index] == format!("file = \"{}\"", name.display())
+    };
+    assert!(imported.files.iter().all(refers), "{text}");
+}
