@@ -183,7 +183,9 @@ impl<'a> SceneReader<'a> {
         if !self.start_environment(object) {
             return;
         }
+        self.document.set_span_for_next_values(span);
         self.document.set("file", file);
+        self.document.set_span_for_next_values(object.span.clone());
         self.document.set("rows", "poles");
         if scale != 1.0 {
             self.document.set("color", shorten_number(scale.max(0.0)));

@@ -145,6 +145,12 @@ impl<'a> SceneReader<'a> {
         let name = self.texture_names.make_unique(object.id.as_deref().unwrap_or(&wanted), "texture");
         self.document.set_span_for_next_values(object.span.clone());
         self.document.start_named_table("textures", &name);
+        // Errors of the image are reported at the name of the file.
+        if let Some(file) = keys.extract_if(.., |(key, _)| *key == "file").next() {
+            self.document.set_span_for_next_values(span_of(object, "filename"));
+            self.set_all(vec![file]);
+            self.document.set_span_for_next_values(object.span.clone());
+        }
         self.set_all(keys);
         self.textures.insert(identity, name.clone());
         Some(name)

@@ -146,14 +146,14 @@ impl<'a> XmlLoader<'a> {
         };
         let message = match error {
             roxmltree::Error::DtdDetected => "the file has a document type declaration".to_owned(),
-            other => {
-                let text = other.to_string();
-                // The position is shown with the source line.
-                text.rsplit_once(" at ").map_or(text.clone(), |(message, _)| message.to_owned())
-            }
+            roxmltree::Error::UnexpectedEndOfStream => "the file ends inside a tag".to_owned(),
+            // The position is shown with the source line.
+            other => other.to_string().replacen(&format!(" at {}", other.pos()), "", 1),
         };
         let offset = match error {
-            roxmltree::Error::UnclosedRootNode | roxmltree::Error::NoRootNode => text.trim_end().len(),
+            roxmltree::Error::UnclosedRootNode
+            | roxmltree::Error::NoRootNode
+            | roxmltree::Error::UnexpectedEndOfStream => text.trim_end().len(),
             roxmltree::Error::DtdDetected => text.find("<!DOCTYPE").unwrap_or_default(),
             other => offset_of(text, other.pos()),
         };

@@ -5,6 +5,7 @@ mod facts;
 mod files;
 mod fuzz;
 mod limits;
+mod messages;
 
 use std::path::{Path, PathBuf};
 
