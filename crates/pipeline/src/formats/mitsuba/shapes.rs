@@ -195,6 +195,13 @@ impl<'a> SceneReader<'a> {
             self.error(object.span.clone(), "the mesh needs `filename`", None);
             return false;
         };
+        let is_readable =
+            Path::new(name).extension().is_some_and(|ending| ending.eq_ignore_ascii_case(&object.plugin));
+        if !is_readable {
+            let help = "use the plugin of the file's format: obj, ply, serialized or stl".to_owned();
+            self.error(span, format!("`{0}` reads only .{0} files", object.plugin), Some(help));
+            return false;
+        }
         // OBJ files are flipped by default, so that v = 0 is at the top like in images.
         let is_obj = object.plugin == "obj";
         let flips_v = self.boolean(object, "flip_tex_coords", is_obj);
