@@ -187,6 +187,7 @@ impl<'a> XmlLoader<'a> {
             let (name, value) = (attribute.name().to_owned(), attribute.value().to_owned());
             attributes.push(Attribute { name, value, span });
         }
+        self.report_stray_text(node, source);
         let tag = node.tag_name().name().to_owned();
         let mut element = Element { tag, attributes, children: Vec::new(), span, is_old: source.is_old };
         for child in node.children().filter(Node::is_element) {
@@ -210,6 +211,19 @@ impl<'a> XmlLoader<'a> {
             }
         }
         Ok(Some(element))
+    }
+
+    /// Reports the first text in an element. Mitsuba's elements contain only elements.
+    fn report_stray_text(&mut self, node: &Node<'_, '_>, source: &FileSource<'_>) {
+        let is_stray = |child: &Node<'_, '_>| child.text().is_some_and(|text| !text.trim().is_empty());
+        let Some(stray) = node.children().find(|child| child.is_text() && is_stray(child)) else { return };
+        let range = stray.range();
+        let text = &source.text[range.clone()];
+        let start = range.start + text.len() - text.trim_start().len();
+        let line = text.trim().lines().next().unwrap_or_default();
+        let span = source.start + start..source.start + start + line.len();
+        let help = "remove it, or make it a comment: <!-- … -->".to_owned();
+        self.error(span, format!("unexpected text `{}`", shorten(line)), Some(help));
     }
 
     fn add_default(&mut self, default: &Element) {
