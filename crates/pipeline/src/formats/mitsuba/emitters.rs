@@ -56,6 +56,7 @@ impl<'a> SceneReader<'a> {
             _ => self.unknown_plugin(object, "emitter", &KNOWN_EMITTERS),
         }
         self.report_unused(index);
+        self.report_unused_children(index);
     }
 
     /// Returns a constant color of light, and reports textures.

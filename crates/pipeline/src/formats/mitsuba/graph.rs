@@ -106,6 +106,7 @@ pub(super) struct Child {
     pub(super) name: Option<String>,
     pub(super) target: ObjectIndex,
     pub(super) span: Range<usize>,
+    pub(super) is_used: Cell<bool>,
 }
 
 impl PluginInstance {
@@ -116,9 +117,11 @@ impl PluginInstance {
         Some(found)
     }
 
-    /// Returns the nested object with a name.
+    /// Returns the nested object with a name, and marks it as used.
     pub(super) fn named_child(&self, name: &str) -> Option<&Child> {
-        self.children.iter().find(|child| child.name.as_deref() == Some(name))
+        let found = self.children.iter().find(|child| child.name.as_deref() == Some(name))?;
+        found.is_used.set(true);
+        Some(found)
     }
 }
 
@@ -221,7 +224,12 @@ impl<'a> GraphBuilder<'a> {
             let name = element.value("name").map(|name| property_name(name, element.is_old));
             if let Some(target) = self.add_object(element, kind) {
                 let span = element.span.clone();
-                self.graph.objects[parent].children.push(Child { name, target, span });
+                self.graph.objects[parent].children.push(Child {
+                    name,
+                    target,
+                    span,
+                    is_used: Cell::new(false),
+                });
             }
             return;
         }
@@ -232,7 +240,8 @@ impl<'a> GraphBuilder<'a> {
                 let name = element.value("name").map(|name| property_name(name, element.is_old));
                 let children = &mut self.graph.objects[parent].children;
                 let child = children.len();
-                children.push(Child { name, target: UNRESOLVED, span: span.clone() });
+                let is_used = Cell::new(false);
+                children.push(Child { name, target: UNRESOLVED, span: span.clone(), is_used });
                 self.references.push(Reference { parent, child, id, span });
             }
             "alias" => {
@@ -298,7 +307,10 @@ impl<'a> GraphBuilder<'a> {
                 })?;
                 Ok(PropertyValue::Transform(values::parse_transform(first)?))
             }
-            "vector" | "point" => Ok(PropertyValue::Vector(parse_point(element, None)?)),
+            "vector" | "point" => {
+                values::check_attributes(element, &["x", "y", "z", "value", "name", "id"])?;
+                Ok(PropertyValue::Vector(parse_point(element, None)?))
+            }
             "blackbody" => {
                 let number = |name: &str, default: f64| match element.attribute(name) {
                     Some(attribute) => {

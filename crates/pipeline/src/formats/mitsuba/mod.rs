@@ -18,6 +18,7 @@ mod shapes;
 #[cfg(test)]
 mod tests;
 mod textures;
+mod unused;
 mod values;
 mod xml;
 
@@ -101,7 +102,7 @@ fn read_scene(
             | ObjectKind::Spectrum
             | ObjectKind::Subsurface
             | ObjectKind::Texture
-            | ObjectKind::Volume => {}
+            | ObjectKind::Volume => reader.report_unreachable_child(scene, child),
         }
     }
     token.check_pause_and_cancel()?;

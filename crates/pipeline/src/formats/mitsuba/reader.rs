@@ -97,6 +97,8 @@ pub(super) struct SceneReader<'a> {
     pub(super) watched_files: HashSet<PathBuf>,
     /// Inspected properties of files, by path and part.
     pub(super) inspected_files: HashMap<(PathBuf, Option<i64>), bool>,
+    /// Objects whose nested objects were reported as unused.
+    pub(super) reported_children: HashSet<ObjectIndex>,
     /// Number of materials in the document.
     pub(super) material_count: usize,
     /// Number of shapes converted, including those that contain shapes.
@@ -144,6 +146,7 @@ impl<'a> SceneReader<'a> {
             blend_parts: HashMap::new(),
             watched_files: HashSet::new(),
             inspected_files: HashMap::new(),
+            reported_children: HashSet::new(),
             material_count: 0,
             shape_count: 0,
             has_stopped: false,
@@ -161,7 +164,11 @@ impl<'a> SceneReader<'a> {
         self.shape_count += 1;
         if self.shape_count > MAX_SHAPES && !self.has_stopped {
             let help = "combine them in meshes, or use instances of a `shapegroup`".to_owned();
-            self.error(object.span.clone(), format!("more than {MAX_SHAPES} shapes and instances"), Some(help));
+            self.error(
+                object.span.clone(),
+                format!("more than {MAX_SHAPES} shapes and instances"),
+                Some(help),
+            );
             self.has_stopped = true;
         }
         !self.must_stop()
@@ -320,14 +327,15 @@ impl<'a> SceneReader<'a> {
         self.transform_value(object, "to_world").map_or(DMat4::IDENTITY, |transform| transform.matrix)
     }
 
-    /// Returns the nested objects of a kind.
+    /// Returns the nested objects of a kind, and marks those that the caller reaches as used.
     pub(super) fn children_of_kind(
         &self,
         object: &'a PluginInstance,
         kind: ObjectKind,
     ) -> impl Iterator<Item = &'a Child> + use<'a> {
         let graph = self.graph;
-        object.children.iter().filter(move |child| graph.objects[child.target].kind == kind)
+        let children = object.children.iter().filter(move |child| graph.objects[child.target].kind == kind);
+        children.inspect(|child| child.is_used.set(true))
     }
 
     /// Adds the entries to the current table.

@@ -82,7 +82,13 @@ impl<'a> SceneReader<'a> {
         }
         let is_added = match object.plugin.as_str() {
             // Groups are added with their first instance.
-            "shapegroup" => false,
+            "shapegroup" => {
+                if target.depth > 0 {
+                    let text = "ignored; put an instance of it there";
+                    self.notes.note("a `shapegroup` in another shape", text, object.span.clone());
+                }
+                false
+            }
             "instance" => self.add_instance(object, target),
             "merge" => {
                 let inner = ShapeTarget { depth: target.depth + 1, ..target };
@@ -105,6 +111,9 @@ impl<'a> SceneReader<'a> {
             }
         };
         self.report_unused(index);
+        if is_added {
+            self.report_unused_children(index);
+        }
         is_added
     }
 

@@ -134,6 +134,7 @@ impl<'a> SceneReader<'a> {
             }
         };
         self.report_unused(index);
+        self.report_unused_children(index);
         let mut keys = keys;
         if factor != 1.0 {
             keys.push(("factor", shorten_number(factor).into()));

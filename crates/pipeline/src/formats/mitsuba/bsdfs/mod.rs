@@ -162,7 +162,8 @@ impl<'a> SceneReader<'a> {
         uv: UvConvention,
         shape: &'a PluginInstance,
     ) {
-        let emitter = self.object(emitter);
+        let index = emitter;
+        let emitter = self.object(index);
         if builder.is_blend {
             let text = "the shape does not emit";
             self.notes.substitute_light("an area light on a `blendbsdf`", text, shape.span.clone());
@@ -188,6 +189,8 @@ impl<'a> SceneReader<'a> {
                 }
             },
         }
+        self.report_unused(index);
+        self.report_unused_children(index);
     }
 
     /// Converts a BSDF. Returns `None` after an error.
@@ -248,6 +251,9 @@ impl<'a> SceneReader<'a> {
             }
         };
         self.report_unused(index);
+        if built.is_some() {
+            self.report_unused_children(index);
+        }
         let is_smooth =
             matches!(object.plugin.as_str(), "conductor" | "dielectric" | "thindielectric" | "plastic");
         built.map(|built| MaterialBuilder {

@@ -20,7 +20,8 @@ fn watched(bench: &Bench) -> Vec<PathBuf> {
 #[test]
 fn missing_spectra_are_errors_or_substitutions() {
     let spectrum = "<spectrum name=\"reflectance\" filename=\"no.spd\"/>";
-    let mut bench = scene(&format!("<shape type=\"sphere\"><bsdf type=\"diffuse\">{spectrum}</bsdf></shape>"));
+    let mut bench =
+        scene(&format!("<shape type=\"sphere\"><bsdf type=\"diffuse\">{spectrum}</bsdf></shape>"));
     let errors = bench.read().expect_err("a missing file");
     assert_eq!(errors[0].message, "spectrum not found: no.spd");
     assert_eq!(watched(&bench), [bench.path("no.spd")]);
@@ -78,9 +79,8 @@ fn all_places_of_missing_includes_are_watched() {
 #[test]
 fn copied_files_have_different_names() {
     let names = ["a/t.obj", "b/t.obj", "t_2.obj", "c/t.obj"];
-    let shape = |name: &str| {
-        format!("<shape type=\"obj\"><string name=\"filename\" value=\"{name}\"/></shape>")
-    };
+    let shape =
+        |name: &str| format!("<shape type=\"obj\"><string name=\"filename\" value=\"{name}\"/></shape>");
     let bench = scene(&names.map(shape).concat());
     for (index, name) in names.iter().enumerate() {
         bench.write(name, format!("{OBJ}# {index}\n"));
@@ -92,7 +92,9 @@ fn copied_files_have_different_names() {
     assert_eq!(copies.len(), names.len(), "{copies:?}");
     let text = imported.document.to_toml();
     let refers = |(name, bytes): &(PathBuf, Vec<u8>)| {
-        let index: usize = (0..names.len()).find(|index| bytes.ends_with(format!("# {index}\n").as_bytes())).expect("a copy");
+        let index: usize = (0..names.len())
+            .find(|index| bytes.ends_with(format!("# {index}\n").as_bytes()))
+            .expect("a copy");
         let files: Vec<_> = text.lines().filter(|line| line.starts_with("file = ")).collect();
         files[index] == format!("file = \"{}\"", name.display())
     };

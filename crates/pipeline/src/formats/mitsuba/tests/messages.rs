@@ -50,9 +50,8 @@ fn images_are_reported_at_their_names() {
 #[test]
 fn mesh_plugins_read_only_their_format() {
     for (plugin, file) in [("obj", "a.gltf"), ("ply", "a.obj"), ("serialized", "a.ply"), ("stl", "a")] {
-        let bench = scene(&format!(
-            "<shape type=\"{plugin}\"><string name=\"filename\" value=\"{file}\"/></shape>"
-        ));
+        let bench =
+            scene(&format!("<shape type=\"{plugin}\"><string name=\"filename\" value=\"{file}\"/></shape>"));
         bench.write(file, "");
         let error = bench.read().expect_err(file).remove(0);
         assert_eq!(error.message, format!("`{plugin}` reads only .{plugin} files"));

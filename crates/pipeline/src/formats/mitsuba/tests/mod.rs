@@ -6,6 +6,7 @@ mod files;
 mod fuzz;
 mod limits;
 mod messages;
+mod unused;
 
 use std::path::{Path, PathBuf};
 
