@@ -92,6 +92,11 @@ impl<'a> SceneReader<'a> {
         let sampler = self.children_of_kind(sensor, ObjectKind::Sampler).next();
         let samples = sampler.map(|child| self.object(child.target));
         let count = samples.and_then(|object| self.integer(object, "sample_count")).unwrap_or(4);
+        if count < 1
+            && let Some(sampler) = samples
+        {
+            self.notes.note("`sample_count` below 1", "replaced by 1", span_of(sampler, "sample_count"));
+        }
         self.document.set("samples", count.clamp(1, i64::from(u32::MAX)) as f64);
         self.add_integrator(scene);
         self.add_filter(film.map(|index| self.object(index)));

@@ -247,7 +247,8 @@ impl<'a> XmlLoader<'a> {
         let Some(value) = path.attribute("value") else {
             return self.error(path.span.clone(), "<path> needs `value`", None);
         };
-        let (span, folder) = (value.span.clone(), substitute(&value.value, &self.parameters));
+        let folder = substitute(&value.value, &self.parameters).replace('\\', "/");
+        let span = value.span.clone();
         let near = file.parent().unwrap_or(Path::new("")).join(&folder);
         let found = std::iter::once(near).chain(self.folders.iter().rev().map(|known| known.join(&folder)));
         match found.into_iter().find(|folder| folder.is_dir()) {
@@ -266,7 +267,8 @@ impl<'a> XmlLoader<'a> {
             self.error(include.span, "<include> needs `filename`", None);
             return Ok(());
         };
-        name.value = substitute(&name.value, &self.parameters);
+        // Files written on Windows have backslashes.
+        name.value = substitute(&name.value, &self.parameters).replace('\\', "/");
         let (span, name) = (name.span.clone(), name.value.clone());
         let near = file.parent().unwrap_or(Path::new("")).join(&name);
         let others = self.folders.iter().rev().map(|folder| folder.join(&name));

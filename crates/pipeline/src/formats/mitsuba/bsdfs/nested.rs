@@ -43,7 +43,7 @@ impl<'a> SceneReader<'a> {
     pub(super) fn mask(&mut self, index: ObjectIndex, context: BsdfContext) -> Option<MaterialBuilder> {
         let object = self.object(index);
         let nested = self.nested_bsdf(object)?;
-        let opacity = self.number(object, "opacity", 0.5);
+        let opacity = self.fraction(object, "opacity", 0.5);
         if opacity == NumberSource::Constant(1.0) {
             return self.bsdf(nested.target, context);
         }
@@ -92,7 +92,7 @@ impl<'a> SceneReader<'a> {
             self.error(object.span.clone(), message, None);
             return None;
         };
-        let weight = self.number(object, "weight", 0.5);
+        let weight = self.fraction(object, "weight", 0.5);
         let weight = self.number_value(weight, context);
         let mut names = Vec::new();
         for child in [first, second] {

@@ -100,3 +100,15 @@ fn copied_files_have_different_names() {
     };
     assert!(imported.files.iter().all(refers), "{text}");
 }
+
+#[test]
+fn includes_may_have_backslashes() {
+    let bench = scene(
+        "<path value=\"parts\\more\"/><include filename=\"parts\\a.xml\"/><include filename=\"b.xml\"/>",
+    );
+    bench.write("parts/a.xml", "<scene version=\"3.0.0\"><shape type=\"sphere\"/></scene>");
+    bench.write("parts/more/b.xml", "<scene version=\"3.0.0\"><shape type=\"cube\"/></scene>");
+    let text = bench.toml();
+    has_line(&text, "[[sphere]]");
+    has_line(&text, "[[box]]");
+}

@@ -128,3 +128,32 @@ fn unknown_attributes_and_text_are_errors() {
         assert!(place.span.start > place.source.find(SENSOR).expect("a sensor"), "{content}");
     }
 }
+
+#[test]
+fn limited_values_are_reported() {
+    let rgb = "<rgb name=\"reflectance\" value=\"-1, 0.5, 0.5\"/>";
+    let float = |name: &str, value: &str| format!("<float name=\"{name}\" value=\"{value}\"/>");
+    let bsdfs = "<bsdf type=\"diffuse\"/><bsdf type=\"plastic\"/>";
+    for (bsdf, note) in [
+        (format!("<bsdf type=\"diffuse\">{rgb}</bsdf>"), "a negative `reflectance`: replaced by 0"),
+        (
+            format!("<bsdf type=\"blendbsdf\">{}{bsdfs}</bsdf>", float("weight", "3")),
+            "`weight` of `blendbsdf` outside of 0 to 1: replaced by 1",
+        ),
+        (
+            format!("<bsdf type=\"mask\">{}<bsdf type=\"diffuse\"/></bsdf>", float("opacity", "7")),
+            "`opacity` of `mask` outside of 0 to 1: replaced by 1",
+        ),
+        (
+            format!("<bsdf type=\"mask\">{}<bsdf type=\"diffuse\"/></bsdf>", float("opacity", "-1")),
+            "`opacity` of `mask` outside of 0 to 1: replaced by 0",
+        ),
+    ] {
+        has_note(&scene(&format!("<shape type=\"sphere\">{bsdf}</shape>")), note);
+    }
+    let bench = Bench::new();
+    let sampler = "<sampler type=\"independent\"><integer name=\"sample_count\" value=\"0\"/></sampler>";
+    let text = format!("<scene version=\"3.0.0\"><sensor type=\"perspective\">{sampler}</sensor></scene>");
+    bench.write("scene.xml", text);
+    has_note(&bench, "`sample_count` below 1: replaced by 1");
+}
