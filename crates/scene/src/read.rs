@@ -52,6 +52,19 @@ pub(super) fn binary_file_error(path: &Path) -> Box<Diagnostic> {
     )
 }
 
+/// Whether the first bytes of a file contain the `[camera]` header of a scene file. Comments in the formats of
+/// other renderers may mention it.
+fn has_camera_header(path: &Path, start: &[u8]) -> bool {
+    const HEADER: &[u8] = b"[camera]";
+    let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
+    if extension != "xml" && extension != "pbrt" {
+        return memchr::memmem::find(start, HEADER).is_some();
+    }
+    let start = start.strip_prefix(b"\xef\xbb\xbf").unwrap_or(start);
+    !start.trim_ascii_start().starts_with(b"<")
+        && start.split(|byte| *byte == b'\n').any(|line| line.trim_ascii_end() == HEADER)
+}
+
 /// Whether a file is readable and has no `[camera]` header near its start, and therefore is not a scene file.
 pub fn lacks_camera_header(path: &Path) -> bool {
     const START: u64 = 1 << 16;
@@ -61,7 +74,7 @@ pub fn lacks_camera_header(path: &Path) -> bool {
         file.take(START).read_to_end(&mut bytes).ok()?;
         Some(bytes)
     };
-    start().is_some_and(|bytes| memchr::memmem::find(&bytes, b"[camera]").is_none())
+    start().is_some_and(|bytes| !has_camera_header(path, &bytes))
 }
 
 fn not_utf8_error(path: &Path, bytes: &[u8], offset: usize) -> Box<Diagnostic> {
@@ -255,6 +268,21 @@ mod tests {
         assert!(picture.help.expect("a help text").contains("glimt new"));
         let lonely = message(&folder.path().join("zebra"));
         assert!(lonely.help.expect("a help text").contains("glimt new"));
+    }
+
+    #[test]
+    fn comments_of_other_formats_are_no_headers() {
+        let xml = "\u{feff}<scene>\n<!--\n[camera]\n-->\n</scene>";
+        let cases = [
+            ("a.xml", xml, false),
+            ("a.pbrt", "# like [camera] in glimt\n", false),
+            ("a.pbrt", "#[camera]\n", false),
+            ("a.XML", "name = 1\n[camera]\r\n", true),
+            ("a.toml", "  [camera] # the view\n", true),
+        ];
+        for (name, text, is_scene) in cases {
+            assert_eq!(has_camera_header(Path::new(name), text.as_bytes()), is_scene, "{name}: {text}");
+        }
     }
 
     #[test]

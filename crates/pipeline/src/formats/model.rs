@@ -1,6 +1,6 @@
 //! The scenes that glimt generates for models: a camera, lights and a ground plane.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
 use super::frame::{
@@ -201,7 +201,11 @@ pub(super) fn add_ground(
 
 /// Names already used in a generated scene.
 #[derive(Debug, Default)]
-pub(super) struct UsedNames(HashSet<String>);
+pub(super) struct UsedNames {
+    names: HashSet<String>,
+    /// The next number to append, by name.
+    next_numbers: HashMap<String, usize>,
+}
 
 impl UsedNames {
     /// Returns `wanted`, with a number appended if it is taken. Falls back to `usual` if `wanted` is empty or
@@ -211,12 +215,32 @@ impl UsedNames {
         let plain = plain.trim();
         let is_name = plain.parse::<f64>().is_err() && !plain.is_empty();
         let plain = if is_name { plain } else { usual };
-        let mut name = plain.to_owned();
-        let mut next = 2;
-        while !self.0.insert(name.clone()) {
-            name = format!("{plain}_{next}");
-            next += 1;
+        if self.names.insert(plain.to_owned()) {
+            return plain.to_owned();
         }
-        name
+        // Many objects can have the same name, so continue with the number after the last one.
+        let next = self.next_numbers.entry(plain.to_owned()).or_insert(2);
+        loop {
+            let name = format!("{plain}_{next}");
+            *next += 1;
+            if self.names.insert(name.clone()) {
+                return name;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_unique_and_found_quickly() {
+        let mut names = UsedNames::default();
+        let first: Vec<_> = ["a", "a_3", "a", "a"].map(|one| names.make_unique(one, "shape")).into();
+        assert_eq!(first, ["a", "a_3", "a_2", "a_4"]);
+        // Quadratic time would be minutes.
+        let last = (0..200_000).map(|_| names.make_unique("a", "shape")).last();
+        assert_eq!(last.as_deref(), Some("a_200004"));
     }
 }

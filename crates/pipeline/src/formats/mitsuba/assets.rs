@@ -7,24 +7,50 @@ use super::reader::SceneReader;
 use super::xml::shorten;
 use crate::assets::Companion;
 use crate::formats::foreign::options::MissingAssetMode;
+use crate::system::file::FileStamp;
 
 impl SceneReader<'_> {
-    /// Searches for a file. Reports an error if it does not exist, or returns `None` with a substitution if
-    /// missing files are allowed.
+    /// Searches for a file. Watches the places before the one where it is found, or all of them if it does not
+    /// exist.
     pub(super) fn find_file(&mut self, name: &str, span: &Range<usize>) -> Option<PathBuf> {
         let own_folder = self.files.path_at(span).and_then(Path::parent);
         let own = own_folder.map(|folder| folder.join(name));
         // Files written on Windows have backslashes.
         let plain = name.replace('\\', "/");
         let names = [name, plain.as_str()];
+        let folders = self.folders;
         let candidates =
-            names.iter().flat_map(|name| self.folders.iter().rev().map(move |folder| folder.join(name)));
-        let found = candidates.chain(own).find(|path| path.is_file());
-        if found.is_none() {
-            let first =
-                self.folders.first().map_or_else(|| PathBuf::from(name), |folder| folder.join(&plain));
-            self.companions.push(Companion { path: first, hash: None, stamp: None });
+            names.iter().flat_map(|name| folders.iter().rev().map(move |folder| folder.join(name)));
+        for candidate in candidates.chain(own) {
+            if candidate.is_file() {
+                return Some(candidate);
+            }
+            if self.watched_files.insert(candidate.clone()) {
+                self.companions.push(Companion { path: candidate, hash: None, stamp: None });
+            }
         }
+        None
+    }
+
+    /// Returns a property of a file, and watches the file because the document depends on the property.
+    /// `inspect` reads it, once per file and `part`.
+    pub(super) fn inspect_watched(
+        &mut self,
+        path: &Path,
+        part: Option<i64>,
+        inspect: impl FnOnce(&Self) -> bool,
+    ) -> bool {
+        let key = (path.to_owned(), part);
+        if let Some(known) = self.inspected_files.get(&key) {
+            return *known;
+        }
+        // The stamp is older than the inspected content.
+        let stamp = FileStamp::from_path(path);
+        if self.watched_files.insert(path.to_owned()) {
+            self.companions.push(Companion { path: path.to_owned(), hash: None, stamp });
+        }
+        let found = inspect(self);
+        self.inspected_files.insert(key, found);
         found
     }
 
@@ -47,8 +73,11 @@ impl SceneReader<'_> {
                 self.error(span.clone(), format!("{kind} not found: {}", shorten(name)), Some(help));
             }
             MissingAssetMode::Note => {
-                let text =
-                    if kind == "image" { "not found; replaced by gray" } else { "not found; left out" };
+                let text = match kind {
+                    "image" => "not found; replaced by gray",
+                    "spectrum" => "not found; replaced by the default value",
+                    _ => "not found; left out",
+                };
                 self.notes.substitute_light(&format!("{kind} {}", shorten(name)), text, span.clone());
             }
         }
@@ -75,12 +104,13 @@ impl SceneReader<'_> {
             .map(|c| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' })
             .take(60)
             .collect();
-        // Names of numbers are allowed for files, so use the extension to make them unique.
-        let unique = self.used_asset_names.make_unique(&format!("{plain}.{extension}"), "asset");
-        let name = match unique.strip_prefix(&format!("{plain}.{extension}")) {
-            Some("") | None => unique.clone(),
-            Some(number) => format!("{plain}{number}.{extension}"),
-        };
+        // The number precedes the extension. The result may be the name of another file.
+        let mut name = format!("{plain}.{extension}");
+        let mut next = 2;
+        while !self.used_asset_names.insert(name.clone()) {
+            name = format!("{plain}_{next}.{extension}");
+            next += 1;
+        }
         let name = format!("{folder}/{name}");
         self.asset_names.insert(path.to_owned(), name.clone());
         name

@@ -5,6 +5,8 @@ use std::ops::Range;
 use super::graph::{Child, ObjectKind, PluginInstance};
 use super::property::{PropertyValue, SpectrumValue};
 use super::reader::{ColorRole, ColorSource, NumberSource, SceneReader, luminance};
+use super::settings::span_of;
+use super::xml::shorten;
 use crate::assets::Companion;
 use crate::formats::foreign::spectra::{
     SampledSpectrum, blackbody_radiance, emission_color, flat_emission_color, reflectance_color,
@@ -37,7 +39,12 @@ impl<'a> SceneReader<'a> {
                 None
             }
         };
-        ColorSource::Constant(color.unwrap_or(DVec3::splat(default)).max(DVec3::ZERO))
+        let color = color.unwrap_or(DVec3::splat(default));
+        if color.min_element() < 0.0 {
+            let subject = format!("a negative `{}`", shorten(name));
+            self.notes.substitute_light(&subject, "replaced by 0", property.span.clone());
+        }
+        ColorSource::Constant(color.max(DVec3::ZERO))
     }
 
     fn color_of_child(&mut self, child: &Child, role: ColorRole) -> ColorSource {
@@ -155,7 +162,7 @@ impl<'a> SceneReader<'a> {
             SpectrumValue::Sampled(spectrum) => Some(sampled_color(spectrum, role)),
             SpectrumValue::Blackbody(kelvin, scale) => Some(blackbody_color(*kelvin) * *scale),
             SpectrumValue::File(name) => {
-                let path = self.find_file(name, span)?;
+                let path = self.asset_path(name, span, "spectrum")?;
                 let read = crate::assets::read_text_file(&path, 16 << 20, self.token);
                 let text = match read {
                     Ok(file) => {
@@ -178,6 +185,24 @@ impl<'a> SceneReader<'a> {
                     }
                 }
             }
+        }
+    }
+
+    /// Returns a number from 0 to 1, or a texture. Limits other numbers and reports them.
+    pub(super) fn fraction(&mut self, object: &'a PluginInstance, name: &str, default: f64) -> NumberSource {
+        match self.number(object, name, default) {
+            NumberSource::Constant(number) if !(0.0..=1.0).contains(&number) => {
+                let subject =
+                    format!("`{}` of `{}` outside of 0 to 1", shorten(name), shorten(&object.plugin));
+                let limited = number.clamp(0.0, 1.0);
+                self.notes.substitute_light(
+                    &subject,
+                    &format!("replaced by {limited}"),
+                    span_of(object, name),
+                );
+                NumberSource::Constant(limited)
+            }
+            source @ (NumberSource::Constant(_) | NumberSource::Texture(_)) => source,
         }
     }
 

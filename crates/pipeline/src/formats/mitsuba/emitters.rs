@@ -56,6 +56,7 @@ impl<'a> SceneReader<'a> {
             _ => self.unknown_plugin(object, "emitter", &KNOWN_EMITTERS),
         }
         self.report_unused(index);
+        self.report_unused_children(index);
     }
 
     /// Returns a constant color of light, and reports textures.
@@ -183,7 +184,9 @@ impl<'a> SceneReader<'a> {
         if !self.start_environment(object) {
             return;
         }
+        self.document.set_span_for_next_values(span);
         self.document.set("file", file);
+        self.document.set_span_for_next_values(object.span.clone());
         self.document.set("rows", "poles");
         if scale != 1.0 {
             self.document.set("color", shorten_number(scale.max(0.0)));

@@ -7,6 +7,7 @@ use std::ops::Range;
 use super::property::{PropertyValue, SpectrumValue, TransformValue};
 use super::values::{self, ValueError, parse_float, parse_numbers, parse_point, property_name};
 use super::xml::{Attribute, Element, MAX_ERRORS, shorten};
+use crate::control::CancelToken;
 use crate::math::{DMat4, DVec3};
 use crate::scene::SourceFiles;
 use crate::scene::diagnostic::{Diagnostic, Severity};
@@ -105,6 +106,7 @@ pub(super) struct Child {
     pub(super) name: Option<String>,
     pub(super) target: ObjectIndex,
     pub(super) span: Range<usize>,
+    pub(super) is_used: Cell<bool>,
 }
 
 impl PluginInstance {
@@ -115,9 +117,11 @@ impl PluginInstance {
         Some(found)
     }
 
-    /// Returns the nested object with a name.
+    /// Returns the nested object with a name, and marks it as used.
     pub(super) fn named_child(&self, name: &str) -> Option<&Child> {
-        self.children.iter().find(|child| child.name.as_deref() == Some(name))
+        let found = self.children.iter().find(|child| child.name.as_deref() == Some(name))?;
+        found.is_used.set(true);
+        Some(found)
     }
 }
 
@@ -135,6 +139,7 @@ pub(super) struct GraphBuilder<'a> {
     references: Vec<Reference>,
     files: &'a SourceFiles,
     pub(super) errors: Vec<Diagnostic>,
+    token: &'a CancelToken,
 }
 
 /// A reference that has not been resolved yet.
@@ -150,9 +155,9 @@ struct Reference {
 const UNRESOLVED: ObjectIndex = usize::MAX;
 
 impl<'a> GraphBuilder<'a> {
-    pub(super) fn new(files: &'a SourceFiles) -> Self {
+    pub(super) fn new(files: &'a SourceFiles, token: &'a CancelToken) -> Self {
         let (graph, ids, references, errors) = Default::default();
-        Self { graph, ids, references, files, errors }
+        Self { graph, ids, references, files, errors, token }
     }
 
     fn error(&mut self, span: Range<usize>, message: impl Into<String>, help: Option<String>) {
@@ -161,7 +166,8 @@ impl<'a> GraphBuilder<'a> {
         }
     }
 
-    /// Builds the graph, whose object 0 is the scene. Returns `None` if there are errors.
+    /// Builds the graph, whose object 0 is the scene. Returns the errors if there are any. The graph is
+    /// incomplete if the token is canceled.
     pub(super) fn build(mut self, root: &Element) -> Result<SceneGraph, Vec<Diagnostic>> {
         self.add_object(root, ObjectKind::Scene);
         self.resolve_references();
@@ -208,6 +214,9 @@ impl<'a> GraphBuilder<'a> {
 
     /// Adds a nested object, a reference or a property to an object.
     fn add_member(&mut self, parent: ObjectIndex, element: &Element) {
+        if self.token.check_pause_and_cancel().is_err() {
+            return;
+        }
         let tag = element.tag.as_str();
         let is_plugin_spectrum = tag == "spectrum" && element.attribute("type").is_some();
         let kind = OBJECT_TAGS.iter().find(|(name, _)| *name == tag).map(|(_, kind)| *kind);
@@ -215,7 +224,12 @@ impl<'a> GraphBuilder<'a> {
             let name = element.value("name").map(|name| property_name(name, element.is_old));
             if let Some(target) = self.add_object(element, kind) {
                 let span = element.span.clone();
-                self.graph.objects[parent].children.push(Child { name, target, span });
+                self.graph.objects[parent].children.push(Child {
+                    name,
+                    target,
+                    span,
+                    is_used: Cell::new(false),
+                });
             }
             return;
         }
@@ -226,7 +240,8 @@ impl<'a> GraphBuilder<'a> {
                 let name = element.value("name").map(|name| property_name(name, element.is_old));
                 let children = &mut self.graph.objects[parent].children;
                 let child = children.len();
-                children.push(Child { name, target: UNRESOLVED, span: span.clone() });
+                let is_used = Cell::new(false);
+                children.push(Child { name, target: UNRESOLVED, span: span.clone(), is_used });
                 self.references.push(Reference { parent, child, id, span });
             }
             "alias" => {
@@ -292,7 +307,10 @@ impl<'a> GraphBuilder<'a> {
                 })?;
                 Ok(PropertyValue::Transform(values::parse_transform(first)?))
             }
-            "vector" | "point" => Ok(PropertyValue::Vector(parse_point(element, None)?)),
+            "vector" | "point" => {
+                values::check_attributes(element, &["x", "y", "z", "value", "name", "id"])?;
+                Ok(PropertyValue::Vector(parse_point(element, None)?))
+            }
             "blackbody" => {
                 let number = |name: &str, default: f64| match element.attribute(name) {
                     Some(attribute) => {
@@ -379,6 +397,7 @@ impl<'a> GraphBuilder<'a> {
         for Reference { parent, child, id, span } in std::mem::take(&mut self.references) {
             match self.ids.get(&id) {
                 Some(&target) => self.graph.objects[parent].children[child].target = target,
+                None if self.errors.len() >= MAX_ERRORS => return,
                 None => {
                     let near = nearest_name(&id, self.ids.keys().map(String::as_str).take(4096));
                     let help = near.map(|near| format!("did you mean `{near}`?"));

@@ -21,3 +21,15 @@ pub(super) struct UvConvention {
     /// Mitsuba's v is 1 − v.
     pub(super) flips_v: bool,
 }
+
+/// What the material of a part of a blend depends on within one shape.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) struct BlendPartKey {
+    pub(super) bsdf: ObjectIndex,
+    pub(super) uv: UvConvention,
+    /// Whether a `twosided` contains the blend.
+    pub(super) is_two_sided: bool,
+    /// The `mask` and the `coating` that contain the blend.
+    pub(super) mask: Option<ObjectIndex>,
+    pub(super) coat: Option<ObjectIndex>,
+}

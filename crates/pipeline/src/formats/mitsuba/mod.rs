@@ -18,6 +18,7 @@ mod shapes;
 #[cfg(test)]
 mod tests;
 mod textures;
+mod unused;
 mod values;
 mod xml;
 
@@ -68,7 +69,9 @@ fn read_scene(
     let Some(root) = root.filter(|_| errors.is_empty()) else {
         return fail(errors, sources.companions);
     };
-    let graph = match GraphBuilder::new(&sources.files).build(&root) {
+    let built = GraphBuilder::new(&sources.files, token).build(&root);
+    token.check_pause_and_cancel()?;
+    let graph = match built {
         Ok(graph) => graph,
         Err(errors) => return fail(errors, sources.companions),
     };
@@ -99,9 +102,10 @@ fn read_scene(
             | ObjectKind::Spectrum
             | ObjectKind::Subsurface
             | ObjectKind::Texture
-            | ObjectKind::Volume => {}
+            | ObjectKind::Volume => reader.report_unreachable_child(scene, child),
         }
     }
+    token.check_pause_and_cancel()?;
     let SceneReader { errors, notes, mut document, companions: found, asset_names, .. } = reader;
     let companions: Vec<Companion> = sources.companions.into_iter().chain(found).collect();
     if !errors.is_empty() {

@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use super::graph::{Child, ObjectIndex, ObjectKind, PluginInstance, SceneGraph};
-use super::material_key::MaterialKey;
+use super::material_key::{BlendPartKey, MaterialKey};
 use super::plastic::PlasticCoat;
 use super::property::{PropertyValue, SpectrumValue, TransformValue};
 use super::xml::{MAX_ERRORS, shorten};
@@ -21,6 +21,11 @@ use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::nearest::nearest_name;
 use crate::scene::{SceneDocumentBuilder, SourceFiles};
 use crate::stages::containers::GltfContainers;
+
+/// Maximum number of shapes and instances. Tests use a small limit.
+const MAX_SHAPES: usize = if cfg!(test) { 20_000 } else { 4_000_000 };
+/// Maximum number of materials. Tests use a small limit.
+const MAX_MATERIALS: usize = if cfg!(test) { 2_000 } else { 1_000_000 };
 
 /// The use of a color. It determines how spectra are converted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -78,7 +83,7 @@ pub(super) struct SceneReader<'a> {
     pub(super) groups: HashMap<ObjectIndex, Option<String>>,
     /// Names of the files that an import writes, by source.
     pub(super) asset_names: BTreeMap<PathBuf, String>,
-    pub(super) used_asset_names: UsedNames,
+    pub(super) used_asset_names: HashSet<String>,
     /// Properties reported as unused.
     pub(super) reported_unused: HashSet<ObjectIndex>,
     pub(super) has_environment: bool,
@@ -86,6 +91,20 @@ pub(super) struct SceneReader<'a> {
     pub(super) black: Option<String>,
     /// Integrals of plastic coats, by index of refraction, α and distribution.
     pub(super) plastic_coats: HashMap<(u64, Option<u64>, bool), PlasticCoat>,
+    /// Names of the materials in the blends of the current shape. `None` marks errors.
+    pub(super) blend_parts: HashMap<BlendPartKey, Option<String>>,
+    /// Files in `companions`.
+    pub(super) watched_files: HashSet<PathBuf>,
+    /// Inspected properties of files, by path and part.
+    pub(super) inspected_files: HashMap<(PathBuf, Option<i64>), bool>,
+    /// Objects whose nested objects were reported as unused.
+    pub(super) reported_children: HashSet<ObjectIndex>,
+    /// Number of materials in the document.
+    pub(super) material_count: usize,
+    /// Number of shapes converted, including those that contain shapes.
+    shape_count: usize,
+    /// Whether a limit was reached or the token was canceled, so that the rest of the scene is skipped.
+    has_stopped: bool,
 }
 
 impl<'a> SceneReader<'a> {
@@ -119,12 +138,72 @@ impl<'a> SceneReader<'a> {
             textures: HashMap::new(),
             groups: HashMap::new(),
             asset_names: BTreeMap::new(),
-            used_asset_names: UsedNames::default(),
+            used_asset_names: HashSet::new(),
             reported_unused: HashSet::new(),
             has_environment: false,
             black: None,
             plastic_coats: HashMap::new(),
+            blend_parts: HashMap::new(),
+            watched_files: HashSet::new(),
+            inspected_files: HashMap::new(),
+            reported_children: HashSet::new(),
+            material_count: 0,
+            shape_count: 0,
+            has_stopped: false,
         }
+    }
+
+    /// Whether the rest of the scene is skipped: a limit was reached, or the token was canceled.
+    pub(super) fn must_stop(&mut self) -> bool {
+        self.has_stopped |= self.token.check_pause_and_cancel().is_err();
+        self.has_stopped
+    }
+
+    /// Counts a shape. Returns whether it may be added.
+    pub(super) fn count_shape(&mut self, object: &PluginInstance) -> bool {
+        self.shape_count += 1;
+        if self.shape_count > MAX_SHAPES && !self.has_stopped {
+            let help = "combine them in meshes, or use instances of a `shapegroup`".to_owned();
+            self.error(
+                object.span.clone(),
+                format!("more than {MAX_SHAPES} shapes and instances"),
+                Some(help),
+            );
+            self.has_stopped = true;
+        }
+        !self.must_stop()
+    }
+
+    /// Whether another material may be added. Reports an error at the reference to its BSDF if not.
+    pub(super) fn may_add_material(&mut self, reference: &Range<usize>) -> bool {
+        if self.material_count >= MAX_MATERIALS && !self.has_stopped {
+            let help = "let shapes share their BSDFs, and nest fewer blends".to_owned();
+            self.error(reference.clone(), format!("more than {MAX_MATERIALS} materials"), Some(help));
+            self.has_stopped = true;
+        }
+        !self.must_stop()
+    }
+
+    /// Whether a predicate is true for any of the objects or any object in them.
+    pub(super) fn any_nested(
+        &self,
+        objects: impl IntoIterator<Item = ObjectIndex>,
+        is_found: impl Fn(&PluginInstance) -> bool,
+    ) -> bool {
+        let mut pending: Vec<ObjectIndex> = objects.into_iter().collect();
+        // References can lead to the same object on many paths.
+        let mut visited: HashSet<ObjectIndex> = HashSet::new();
+        while let Some(index) = pending.pop() {
+            if !visited.insert(index) {
+                continue;
+            }
+            let object = self.object(index);
+            if is_found(object) {
+                return true;
+            }
+            pending.extend(object.children.iter().map(|child| child.target));
+        }
+        false
     }
 
     /// Returns an object. The result does not borrow the reader.
@@ -137,6 +216,7 @@ impl<'a> SceneReader<'a> {
         if self.errors.len() < MAX_ERRORS {
             self.errors.push(self.files.diagnostic(Severity::Error, span, message, "", help));
         }
+        self.has_stopped |= self.errors.len() >= MAX_ERRORS;
     }
 
     /// Reports a feature that glimt lacks and cannot replace.
@@ -247,14 +327,15 @@ impl<'a> SceneReader<'a> {
         self.transform_value(object, "to_world").map_or(DMat4::IDENTITY, |transform| transform.matrix)
     }
 
-    /// Returns the nested objects of a kind.
+    /// Returns the nested objects of a kind, and marks those that the caller reaches as used.
     pub(super) fn children_of_kind(
         &self,
         object: &'a PluginInstance,
         kind: ObjectKind,
     ) -> impl Iterator<Item = &'a Child> + use<'a> {
         let graph = self.graph;
-        object.children.iter().filter(move |child| graph.objects[child.target].kind == kind)
+        let children = object.children.iter().filter(move |child| graph.objects[child.target].kind == kind);
+        children.inspect(|child| child.is_used.set(true))
     }
 
     /// Adds the entries to the current table.

@@ -81,7 +81,8 @@ impl<'a> SceneReader<'a> {
     /// Adds the `[render]` and `[camera]` tables.
     pub(super) fn add_settings(&mut self, scene: &'a PluginInstance) {
         let Some(sensor) = self.select_sensor(scene) else { return };
-        let sensor = self.object(sensor.target);
+        let sensor_index = sensor.target;
+        let sensor = self.object(sensor_index);
         let film = self.children_of_kind(sensor, ObjectKind::Film).next().map(|child| child.target);
         let window = self.film_window(film.map(|index| self.object(index)));
         self.document.set_span_for_next_values(sensor.span.clone());
@@ -91,11 +92,16 @@ impl<'a> SceneReader<'a> {
         let sampler = self.children_of_kind(sensor, ObjectKind::Sampler).next();
         let samples = sampler.map(|child| self.object(child.target));
         let count = samples.and_then(|object| self.integer(object, "sample_count")).unwrap_or(4);
+        if count < 1
+            && let Some(sampler) = samples
+        {
+            self.notes.note("`sample_count` below 1", "replaced by 1", span_of(sampler, "sample_count"));
+        }
         self.document.set("samples", count.clamp(1, i64::from(u32::MAX)) as f64);
         self.add_integrator(scene);
         self.add_filter(film.map(|index| self.object(index)));
         self.add_camera(sensor, &window);
-        film.into_iter().for_each(|index| self.report_unused(index));
+        self.report_unused_settings(scene, sensor_index);
     }
 
     /// Returns the sensor to use.

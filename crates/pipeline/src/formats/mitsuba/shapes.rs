@@ -63,6 +63,9 @@ impl<'a> SceneReader<'a> {
     /// Adds a shape. Returns whether anything was added.
     pub(super) fn add_shape(&mut self, index: ObjectIndex, target: ShapeTarget<'_>) -> bool {
         let object = self.object(index);
+        if !self.count_shape(object) {
+            return false;
+        }
         if target.depth > MAX_DEPTH {
             self.error(object.span.clone(), "shapes are nested too deeply", None);
             return false;
@@ -79,7 +82,13 @@ impl<'a> SceneReader<'a> {
         }
         let is_added = match object.plugin.as_str() {
             // Groups are added with their first instance.
-            "shapegroup" => false,
+            "shapegroup" => {
+                if target.depth > 0 {
+                    let text = "ignored; put an instance of it there";
+                    self.notes.note("a `shapegroup` in another shape", text, object.span.clone());
+                }
+                false
+            }
             "instance" => self.add_instance(object, target),
             "merge" => {
                 let inner = ShapeTarget { depth: target.depth + 1, ..target };
@@ -102,6 +111,9 @@ impl<'a> SceneReader<'a> {
             }
         };
         self.report_unused(index);
+        if is_added {
+            self.report_unused_children(index);
+        }
         is_added
     }
 
@@ -192,6 +204,13 @@ impl<'a> SceneReader<'a> {
             self.error(object.span.clone(), "the mesh needs `filename`", None);
             return false;
         };
+        let is_readable =
+            Path::new(name).extension().is_some_and(|ending| ending.eq_ignore_ascii_case(&object.plugin));
+        if !is_readable {
+            let help = "use the plugin of the file's format: obj, ply, serialized or stl".to_owned();
+            self.error(span, format!("`{0}` reads only .{0} files", object.plugin), Some(help));
+            return false;
+        }
         // OBJ files are flipped by default, so that v = 0 is at the top like in images.
         let is_obj = object.plugin == "obj";
         let flips_v = self.boolean(object, "flip_tex_coords", is_obj);
@@ -229,14 +248,16 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Whether no face of a mesh has an area. Only small files are checked, because such meshes are small.
-    fn is_mesh_without_area(&self, path: &Path, part: Option<i64>) -> bool {
+    fn is_mesh_without_area(&mut self, path: &Path, part: Option<i64>) -> bool {
         const MAX_BYTES: u64 = 4096;
         if !std::fs::metadata(path).is_ok_and(|metadata| metadata.len() <= MAX_BYTES) {
             return false;
         }
-        let part = part.and_then(|part| u32::try_from(part).ok());
-        let loaded = self.containers.load_any_mesh(path, part, &ignore_progress, self.token);
-        matches!(loaded, Err(AssetError::Malformed { reason, .. }) if reason.starts_with(NO_USABLE_FACE))
+        self.inspect_watched(path, part, |reader| {
+            let part = part.and_then(|part| u32::try_from(part).ok());
+            let loaded = reader.containers.load_any_mesh(path, part, &ignore_progress, reader.token);
+            matches!(loaded, Err(AssetError::Malformed { reason, .. }) if reason.starts_with(NO_USABLE_FACE))
+        })
     }
 
     fn add_sphere(&mut self, object: &'a PluginInstance, target: ShapeTarget<'_>) -> bool {
@@ -276,18 +297,10 @@ impl<'a> SceneReader<'a> {
 
     /// Whether the material of a shape depends on its texture coordinates or tangents.
     fn shape_uses_coordinates(&self, object: &'a PluginInstance) -> bool {
-        let mut pending: Vec<ObjectIndex> = object.children.iter().map(|child| child.target).collect();
-        while let Some(index) = pending.pop() {
-            let inner = self.object(index);
-            if inner.kind == ObjectKind::Texture || inner.properties.iter().any(|one| one.name == "alpha_u") {
-                return true;
-            }
-            if pending.len() > 10_000 {
-                return true;
-            }
-            pending.extend(inner.children.iter().map(|child| child.target));
-        }
-        false
+        let children = object.children.iter().map(|child| child.target);
+        self.any_nested(children, |inner| {
+            inner.kind == ObjectKind::Texture || inner.properties.iter().any(|one| one.name == "alpha_u")
+        })
     }
 
     fn add_cylinder(&mut self, object: &'a PluginInstance, target: ShapeTarget<'_>) -> bool {

@@ -134,6 +134,7 @@ impl<'a> SceneReader<'a> {
             }
         };
         self.report_unused(index);
+        self.report_unused_children(index);
         let mut keys = keys;
         if factor != 1.0 {
             keys.push(("factor", shorten_number(factor).into()));
@@ -145,6 +146,12 @@ impl<'a> SceneReader<'a> {
         let name = self.texture_names.make_unique(object.id.as_deref().unwrap_or(&wanted), "texture");
         self.document.set_span_for_next_values(object.span.clone());
         self.document.start_named_table("textures", &name);
+        // Errors of the image are reported at the name of the file.
+        if let Some(file) = keys.extract_if(.., |(key, _)| *key == "file").next() {
+            self.document.set_span_for_next_values(span_of(object, "filename"));
+            self.set_all(vec![file]);
+            self.document.set_span_for_next_values(object.span.clone());
+        }
         self.set_all(keys);
         self.textures.insert(identity, name.clone());
         Some(name)
@@ -201,12 +208,12 @@ impl<'a> SceneReader<'a> {
         let Some((name, span)) = self.text(object, "filename") else { return false };
         let Some(path) = self.find_file(name, &span) else { return false };
         match extension(&path.to_string_lossy()).as_str() {
-            "png" | "apng" => {
+            "png" | "apng" => self.inspect_watched(&path, None, |_| {
                 use std::io::Read;
                 let mut start = [0; 33];
                 let read = std::fs::File::open(&path).and_then(|mut file| file.read_exact(&mut start));
                 read.is_ok() && matches!(start[25], 4 | 6)
-            }
+            }),
             "tga" | "webp" | "exr" | "bmp" => true,
             _ => false,
         }

@@ -168,7 +168,29 @@ pub(super) fn parse_transform(element: &Element) -> Result<TransformValue, Value
     Ok(transform)
 }
 
+/// Rejects attributes that an element does not have.
+pub(super) fn check_attributes(element: &Element, known: &[&str]) -> Result<(), ValueError> {
+    let Some(unknown) = element.attributes.iter().find(|one| !known.contains(&one.name.as_str())) else {
+        return Ok(());
+    };
+    let help = match nearest_name(&unknown.name, known.iter().copied()) {
+        Some(near) => format!("did you mean `{near}`?"),
+        None => format!("expected {}", known.join(", ")),
+    };
+    let message = format!("<{}> has no attribute `{}`", shorten(&element.tag), shorten(&unknown.name));
+    Err(ValueError { help: Some(help), ..ValueError::new(&unknown.span, message) })
+}
+
 fn parse_step(step: &Element) -> Result<(DMat4, Option<DVec3>), ValueError> {
+    let known: &[&str] = match step.tag.to_ascii_lowercase().as_str() {
+        "rotate" => &["x", "y", "z", "angle", "value"],
+        "lookat" => &["origin", "target", "up"],
+        "matrix" => &["value"],
+        _ => &["x", "y", "z", "value"],
+    };
+    if STEPS.contains(&step.tag.to_ascii_lowercase().as_str()) {
+        check_attributes(step, known)?;
+    }
     let required = |name: &str| {
         let missing = || ValueError::new(&step.span, format!("<{}> needs `{name}`", shorten(&step.tag)));
         step.attribute(name).ok_or_else(missing)

@@ -106,6 +106,7 @@ impl<'a> XmlLoader<'a> {
         }
         self.parameters.sort_by_key(|(name, _)| std::cmp::Reverse(name.len()));
         self.substitute_in_element(&mut root);
+        self.token.check_pause_and_cancel()?;
         Ok(Some(root))
     }
 
@@ -145,14 +146,14 @@ impl<'a> XmlLoader<'a> {
         };
         let message = match error {
             roxmltree::Error::DtdDetected => "the file has a document type declaration".to_owned(),
-            other => {
-                let text = other.to_string();
-                // The position is shown with the source line.
-                text.rsplit_once(" at ").map_or(text.clone(), |(message, _)| message.to_owned())
-            }
+            roxmltree::Error::UnexpectedEndOfStream => "the file ends inside a tag".to_owned(),
+            // The position is shown with the source line.
+            other => other.to_string().replacen(&format!(" at {}", other.pos()), "", 1),
         };
         let offset = match error {
-            roxmltree::Error::UnclosedRootNode | roxmltree::Error::NoRootNode => text.trim_end().len(),
+            roxmltree::Error::UnclosedRootNode
+            | roxmltree::Error::NoRootNode
+            | roxmltree::Error::UnexpectedEndOfStream => text.trim_end().len(),
             roxmltree::Error::DtdDetected => text.find("<!DOCTYPE").unwrap_or_default(),
             other => offset_of(text, other.pos()),
         };
@@ -167,6 +168,7 @@ impl<'a> XmlLoader<'a> {
         source: &FileSource<'_>,
         depth: usize,
     ) -> Result<Option<Element>, AssetError> {
+        self.token.check_pause_and_cancel()?;
         let span = tag_span(source.text, node, source.start);
         if depth > MAX_DEPTH {
             let help = "flatten the scene".to_owned();
@@ -185,6 +187,7 @@ impl<'a> XmlLoader<'a> {
             let (name, value) = (attribute.name().to_owned(), attribute.value().to_owned());
             attributes.push(Attribute { name, value, span });
         }
+        self.report_stray_text(node, source);
         let tag = node.tag_name().name().to_owned();
         let mut element = Element { tag, attributes, children: Vec::new(), span, is_old: source.is_old };
         for child in node.children().filter(Node::is_element) {
@@ -210,6 +213,19 @@ impl<'a> XmlLoader<'a> {
         Ok(Some(element))
     }
 
+    /// Reports the first text in an element. Mitsuba's elements contain only elements.
+    fn report_stray_text(&mut self, node: &Node<'_, '_>, source: &FileSource<'_>) {
+        let is_stray = |child: &Node<'_, '_>| child.text().is_some_and(|text| !text.trim().is_empty());
+        let Some(stray) = node.children().find(|child| child.is_text() && is_stray(child)) else { return };
+        let range = stray.range();
+        let text = &source.text[range.clone()];
+        let start = range.start + text.len() - text.trim_start().len();
+        let line = text.trim().lines().next().unwrap_or_default();
+        let span = source.start + start..source.start + start + line.len();
+        let help = "remove it, or make it a comment: <!-- … -->".to_owned();
+        self.error(span, format!("unexpected text `{}`", shorten(line)), Some(help));
+    }
+
     fn add_default(&mut self, default: &Element) {
         let (Some(name), Some(value)) = (default.value("name"), default.attribute("value")) else {
             let help = "write <default name=\"…\" value=\"…\"/>".to_owned();
@@ -231,7 +247,8 @@ impl<'a> XmlLoader<'a> {
         let Some(value) = path.attribute("value") else {
             return self.error(path.span.clone(), "<path> needs `value`", None);
         };
-        let (span, folder) = (value.span.clone(), substitute(&value.value, &self.parameters));
+        let folder = substitute(&value.value, &self.parameters).replace('\\', "/");
+        let span = value.span.clone();
         let near = file.parent().unwrap_or(Path::new("")).join(&folder);
         let found = std::iter::once(near).chain(self.folders.iter().rev().map(|known| known.join(&folder)));
         match found.into_iter().find(|folder| folder.is_dir()) {
@@ -250,13 +267,21 @@ impl<'a> XmlLoader<'a> {
             self.error(include.span, "<include> needs `filename`", None);
             return Ok(());
         };
-        name.value = substitute(&name.value, &self.parameters);
+        // Files written on Windows have backslashes.
+        name.value = substitute(&name.value, &self.parameters).replace('\\', "/");
         let (span, name) = (name.span.clone(), name.value.clone());
         let near = file.parent().unwrap_or(Path::new("")).join(&name);
-        let candidates =
-            std::iter::once(near.clone()).chain(self.folders.iter().rev().map(|folder| folder.join(&name)));
-        let Some(found) = candidates.into_iter().find(|path| path.is_file()) else {
-            self.reader.watch_missing(near);
+        let others = self.folders.iter().rev().map(|folder| folder.join(&name));
+        let mut found = None;
+        for candidate in std::iter::once(near).chain(others) {
+            if candidate.is_file() {
+                found = Some(candidate);
+                break;
+            }
+            // The file may be created in any of the folders.
+            self.reader.watch_missing(candidate);
+        }
+        let Some(found) = found else {
             let help = "files are searched next to this file, then in the folders of <path>".to_owned();
             self.error(span, format!("included file not found: {}", shorten(&name)), Some(help));
             return Ok(());
@@ -288,6 +313,9 @@ impl<'a> XmlLoader<'a> {
     }
 
     fn substitute_in_element(&mut self, element: &mut Element) {
+        if self.token.is_canceled() {
+            return;
+        }
         for attribute in &mut element.attributes {
             if !attribute.value.contains('$') {
                 continue;
@@ -298,7 +326,7 @@ impl<'a> XmlLoader<'a> {
             if is_too_long || self.substituted_bytes > MAX_ADDED_BYTES {
                 attribute.value = String::new();
                 if self.errors.len() >= MAX_ERRORS {
-                    continue;
+                    return;
                 }
                 self.errors.push(self.reader.files.diagnostic(
                     Severity::Error,

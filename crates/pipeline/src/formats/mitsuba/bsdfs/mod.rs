@@ -104,12 +104,17 @@ impl<'a> SceneReader<'a> {
         shape: &'a PluginInstance,
     ) -> Option<String> {
         let index = bsdf.map(|child| child.target);
-        let has_textures = index.into_iter().chain(emitter).any(|index| self.has_textures(index));
+        let has_textures =
+            self.any_nested(index.into_iter().chain(emitter), |inner| inner.kind == ObjectKind::Texture);
         let uv = if has_textures { uv } else { UvConvention::default() };
         let key = MaterialKey { bsdf: index, emitter, uv };
         if let Some(known) = self.materials.get(&key) {
             return known.clone();
         }
+        if !self.may_add_material(bsdf.map_or(&shape.span, |child| &child.span)) {
+            return None;
+        }
+        self.blend_parts.clear();
         let context = BsdfContext { uv, is_two_sided: false, mask: None, coat: None, depth: 0 };
         let builder = match bsdf {
             Some(child) => self.bsdf(child.target, context),
@@ -137,6 +142,7 @@ impl<'a> SceneReader<'a> {
         wanted: &str,
         span: std::ops::Range<usize>,
     ) -> String {
+        self.material_count += 1;
         let name = self.material_names.make_unique(wanted, "material");
         self.document.set_span_for_next_values(span);
         self.document.start_named_table("materials", &name);
@@ -148,24 +154,6 @@ impl<'a> SceneReader<'a> {
         name
     }
 
-    /// Whether an object or an object in it is a texture.
-    fn has_textures(&self, index: ObjectIndex) -> bool {
-        let mut pending = vec![index];
-        let mut visited = 0;
-        while let Some(index) = pending.pop() {
-            let object = self.object(index);
-            if object.kind == ObjectKind::Texture {
-                return true;
-            }
-            visited += 1;
-            if visited > 10_000 {
-                return true;
-            }
-            pending.extend(object.children.iter().map(|child| child.target));
-        }
-        false
-    }
-
     /// Adds the emission of an area light.
     fn add_emission(
         &mut self,
@@ -174,7 +162,8 @@ impl<'a> SceneReader<'a> {
         uv: UvConvention,
         shape: &'a PluginInstance,
     ) {
-        let emitter = self.object(emitter);
+        let index = emitter;
+        let emitter = self.object(index);
         if builder.is_blend {
             let text = "the shape does not emit";
             self.notes.substitute_light("an area light on a `blendbsdf`", text, shape.span.clone());
@@ -200,6 +189,8 @@ impl<'a> SceneReader<'a> {
                 }
             },
         }
+        self.report_unused(index);
+        self.report_unused_children(index);
     }
 
     /// Converts a BSDF. Returns `None` after an error.
@@ -260,6 +251,9 @@ impl<'a> SceneReader<'a> {
             }
         };
         self.report_unused(index);
+        if built.is_some() {
+            self.report_unused_children(index);
+        }
         let is_smooth =
             matches!(object.plugin.as_str(), "conductor" | "dielectric" | "thindielectric" | "plastic");
         built.map(|built| MaterialBuilder {

@@ -3,6 +3,7 @@
 use super::{BsdfContext, MaterialBuilder};
 use crate::formats::foreign::import::TableEntries;
 use crate::formats::mitsuba::graph::{Child, ObjectIndex, ObjectKind, PluginInstance};
+use crate::formats::mitsuba::material_key::BlendPartKey;
 use crate::formats::mitsuba::property::PropertyValue;
 use crate::formats::mitsuba::reader::{ColorRole, ColorSource, NumberSource, SceneReader};
 use crate::formats::mitsuba::textures::MitsubaTextureUse;
@@ -42,7 +43,7 @@ impl<'a> SceneReader<'a> {
     pub(super) fn mask(&mut self, index: ObjectIndex, context: BsdfContext) -> Option<MaterialBuilder> {
         let object = self.object(index);
         let nested = self.nested_bsdf(object)?;
-        let opacity = self.number(object, "opacity", 0.5);
+        let opacity = self.fraction(object, "opacity", 0.5);
         if opacity == NumberSource::Constant(1.0) {
             return self.bsdf(nested.target, context);
         }
@@ -91,31 +92,60 @@ impl<'a> SceneReader<'a> {
             self.error(object.span.clone(), message, None);
             return None;
         };
-        let weight = self.number(object, "weight", 0.5);
+        let weight = self.fraction(object, "weight", 0.5);
         let weight = self.number_value(weight, context);
         let mut names = Vec::new();
         for child in [first, second] {
-            let mut built = self.bsdf(child.target, context)?;
-            let inner = self.object(child.target);
-            if built.is_glass && !built.has("thin") {
-                self.refuse(object, "blends that contain solid glass");
-                return None;
-            }
-            if built.is_invisible {
-                // A surface without effect is transparent.
-                built = MaterialBuilder::new("phong", vec![("diffuse", 0.0.into()), ("opacity", 0.0.into())]);
-            }
-            if built.has_smooth_reflection {
-                let text = "glimt blends their light by the weight; Mitsuba mixes up their pdfs";
-                self.notes.note("smooth metal, glass or plastic in a blend", text, object.span.clone());
-            }
-            built.is_one_sided &= !context.is_two_sided;
-            self.add_enclosing_keys(&mut built, context);
-            let wanted = inner.id.as_deref().unwrap_or(&inner.plugin);
-            names.push(BuiltValue::from(self.add_material(built, wanted, inner.span.clone())));
+            names.push(BuiltValue::from(self.blend_part(object, child, context)?));
         }
         let keys = vec![("materials", BuiltValue::Array(names)), ("weight", weight)];
         Some(MaterialBuilder { is_blend: true, ..MaterialBuilder::new("blend", keys) })
+    }
+
+    /// Returns the name of a material of a blend, adding it if it is new. Returns `None` after an error.
+    fn blend_part(
+        &mut self,
+        blend: &'a PluginInstance,
+        child: &'a Child,
+        context: BsdfContext,
+    ) -> Option<String> {
+        let BsdfContext { uv, is_two_sided, mask, coat, depth: _ } = context;
+        let key = BlendPartKey { bsdf: child.target, uv, is_two_sided, mask, coat };
+        if let Some(known) = self.blend_parts.get(&key) {
+            return known.clone();
+        }
+        let name = self.new_blend_part(blend, child, context);
+        self.blend_parts.insert(key, name.clone());
+        name
+    }
+
+    fn new_blend_part(
+        &mut self,
+        blend: &'a PluginInstance,
+        child: &'a Child,
+        context: BsdfContext,
+    ) -> Option<String> {
+        if !self.may_add_material(&child.span) {
+            return None;
+        }
+        let mut built = self.bsdf(child.target, context)?;
+        let inner = self.object(child.target);
+        if built.is_glass && !built.has("thin") {
+            self.refuse(blend, "blends that contain solid glass");
+            return None;
+        }
+        if built.is_invisible {
+            // A surface without effect is transparent.
+            built = MaterialBuilder::new("phong", vec![("diffuse", 0.0.into()), ("opacity", 0.0.into())]);
+        }
+        if built.has_smooth_reflection {
+            let text = "glimt blends their light by the weight; Mitsuba mixes up their pdfs";
+            self.notes.note("smooth metal, glass or plastic in a blend", text, blend.span.clone());
+        }
+        built.is_one_sided &= !context.is_two_sided;
+        self.add_enclosing_keys(&mut built, context);
+        let wanted = inner.id.as_deref().unwrap_or(&inner.plugin);
+        Some(self.add_material(built, wanted, inner.span.clone()))
     }
 
     pub(super) fn coating(&mut self, index: ObjectIndex, context: BsdfContext) -> Option<MaterialBuilder> {

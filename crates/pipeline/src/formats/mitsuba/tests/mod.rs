@@ -2,7 +2,11 @@
 
 mod broken;
 mod facts;
+mod files;
 mod fuzz;
+mod limits;
+mod messages;
+mod unused;
 
 use std::path::{Path, PathBuf};
 
