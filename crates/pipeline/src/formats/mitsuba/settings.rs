@@ -12,9 +12,9 @@ use crate::math::{DMat4, DVec3};
 const DEFAULT_FILM_SIZE: [i64; 2] = [768, 576];
 /// Maximum width and height of an image.
 const MAX_SIZE: i64 = 65_536;
-/// Diagonal of 35 mm film in millimeters, to which focal lengths refer.
+/// Diagonal of 35 mm film in millimeters, the reference for focal lengths.
 const FILM_DIAGONAL: f64 = 43.266_615_305_567_87;
-/// Bounces for integrators without a depth limit.
+/// `max_depth` for integrators without a depth limit.
 const UNLIMITED_DEPTH: f64 = 1000.0;
 
 /// Integrators that solve the whole rendering equation.
@@ -51,9 +51,9 @@ const WRAPPERS: [&str; 5] = ["moment", "aov", "multichannel", "adaptive", "irrca
 struct FilmWindow {
     /// Size of the whole film.
     size: [f64; 2],
-    /// Offset of the rendered part.
+    /// Offset of the crop window.
     crop_offset: [f64; 2],
-    /// Size of the rendered part.
+    /// Size of the crop window.
     crop_size: [f64; 2],
 }
 
@@ -68,8 +68,8 @@ impl FilmWindow {
         self.crop_size[1] / self.size[1]
     }
 
-    /// Offset of the rendered part's center from the film's center, to the right and up, in heights of the
-    /// rendered part.
+    /// Offset of the crop window's center from the film's center, to the right and up, in units of the crop
+    /// window's height.
     fn shift(&self) -> [f64; 2] {
         let offset =
             |axis: usize| self.crop_offset[axis] + self.crop_size[axis] / 2.0 - self.size[axis] / 2.0;
@@ -98,7 +98,7 @@ impl<'a> SceneReader<'a> {
         film.into_iter().for_each(|index| self.report_unused(index));
     }
 
-    /// Returns the sensor to use.
+    /// Returns the sensor selected with `--sensor`, or the first one.
     fn select_sensor(&mut self, scene: &'a PluginInstance) -> Option<&'a Child> {
         let sensors: Vec<&Child> = self.children_of_kind(scene, ObjectKind::Sensor).collect();
         if sensors.is_empty() {
@@ -240,7 +240,7 @@ impl<'a> SceneReader<'a> {
     fn add_integrator(&mut self, scene: &'a PluginInstance) {
         let mut integrator = self.children_of_kind(scene, ObjectKind::Integrator).next();
         let mut nested = 0;
-        // Integrators that add channels contain the integrator of the light.
+        // Integrators that add channels wrap the integrator that computes the light.
         while let Some(child) = integrator {
             let object = self.object(child.target);
             if !WRAPPERS.contains(&object.plugin.as_str()) || nested > 8 {
@@ -363,7 +363,7 @@ impl<'a> SceneReader<'a> {
                 }
             }
             "orthographic" | "telecentric" => {
-                // The film spans −1 … 1 along x in the sensor's coordinates.
+                // The film spans −1 to 1 along x in the sensor's space.
                 self.document.set("projection", "orthographic");
                 self.document.set("view_height", 2.0 * width / window.aspect() * window.height_fraction());
                 if plugin == "telecentric" {

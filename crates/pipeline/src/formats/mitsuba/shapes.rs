@@ -15,7 +15,7 @@ use crate::formats::foreign::transform::{
 };
 use crate::math::{DMat4, DVec3};
 
-/// Plugins that are shapes in Mitsuba 3, 2 or 0.6.
+/// Shape plugins of Mitsuba 3, 2 and 0.6.
 const KNOWN_SHAPES: [&str; 18] = [
     "obj",
     "ply",
@@ -42,8 +42,8 @@ const NO_USABLE_FACE: &str = "no usable face";
 /// Maximum depth of nested shapes.
 const MAX_DEPTH: u32 = 16;
 
-/// Corners of a cube's faces in the order of Mitsuba's vertices. The bits of a corner are the signs of its
-/// coordinates.
+/// Corners of a cube's faces, in the order of Mitsuba's vertices. Bit i of a corner is set if coordinate i is
+/// positive.
 const CUBE_FACES: [[u32; 4]; 6] =
     [[1, 5, 4, 0], [3, 2, 6, 7], [1, 3, 7, 5], [5, 7, 6, 4], [4, 6, 2, 0], [3, 1, 0, 2]];
 
@@ -139,7 +139,7 @@ impl<'a> SceneReader<'a> {
         self.material(bsdf, emitter, uv, object)
     }
 
-    /// Reports flipped normals, which glimt ignores. In Mitsuba, mirroring transforms also flip normals.
+    /// Reports flipped normals, which glimt ignores. In Mitsuba, mirroring transforms flip normals as well.
     fn note_flipped_normals(&mut self, object: &'a PluginInstance) {
         let text = "the front is the usual side, which matters to one-sided materials, glass and lights";
         self.notes.substitute_light(

@@ -12,7 +12,7 @@ use crate::math::DVec3;
 use crate::scene::BuiltValue;
 
 impl<'a> SceneReader<'a> {
-    /// Returns the single nested BSDF.
+    /// Returns the first nested BSDF, or reports an error.
     pub(super) fn nested_bsdf(&mut self, object: &'a PluginInstance) -> Option<&'a Child> {
         let nested = self.children_of_kind(object, ObjectKind::Bsdf).next();
         if nested.is_none() {
@@ -53,7 +53,7 @@ impl<'a> SceneReader<'a> {
         }
         let context = BsdfContext { mask: Some(index), ..context };
         let mut built = self.bsdf(nested.target, context)?;
-        // The materials of a blend have the opacity already.
+        // The materials of a blend already have the opacity.
         if !built.is_invisible && !built.is_blend {
             self.add_opacity(&mut built, context);
         }
@@ -128,14 +128,14 @@ impl<'a> SceneReader<'a> {
         }
         let context = BsdfContext { coat: Some(index), ..context };
         let mut built = self.bsdf(nested.target, context)?;
-        // The materials of a blend have the coat already.
+        // The materials of a blend already have the coat.
         if !built.is_invisible && !built.is_blend {
             self.add_coat(&mut built, context);
         }
         Some(built)
     }
 
-    /// Adds the keys of the `mask` and the `coating` that contain a part of a blend.
+    /// Adds the keys of the `mask` and the `coating` that contain one material of a blend.
     pub(super) fn add_enclosing_keys(&mut self, part: &mut MaterialBuilder, context: BsdfContext) {
         if part.is_blend {
             return;
@@ -174,7 +174,7 @@ impl<'a> SceneReader<'a> {
         built.keys.push(("coat_ior", shorten_number(ior).into()));
         match self.color(object, "sigma_a", ColorRole::Unbounded, 0.0) {
             ColorSource::Constant(sigma) if sigma != DVec3::ZERO => {
-                // The light passes through the layer twice.
+                // Light passes through the layer twice.
                 let tint = sigma.to_array().map(|sigma| libm::exp(-2.0 * thickness * sigma).clamp(0.0, 1.0));
                 built.keys.push(("coat_tint", shorten_color(tint.into())));
             }
@@ -203,7 +203,7 @@ impl<'a> SceneReader<'a> {
         let nested = self.nested_bsdf(object)?;
         let texture = self.nested_texture(object)?;
         let mut scale = self.float(object, "scale").unwrap_or(1.0);
-        // Version 0.6 scales the texture with a `scale` texture.
+        // Version 0.6 wraps the texture in a `scale` texture to scale it.
         let mut texture = texture;
         while self.object(texture).plugin == "scale" {
             let outer = self.object(texture);

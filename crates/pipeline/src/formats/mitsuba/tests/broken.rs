@@ -1,9 +1,9 @@
-//! Broken scenes: every error has the line and column of the mistake.
+//! Broken scenes: every error points to the line and column of the mistake.
 
 use super::{Bench, SENSOR};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 
-/// Line and column, both starting at 1, of a diagnostic.
+/// Line and column of a diagnostic, both starting at 1.
 fn place(diagnostic: &Diagnostic) -> (usize, usize) {
     let place = diagnostic.place.as_ref().unwrap_or_else(|| panic!("no place: {}", diagnostic.message));
     let before = &place.source[..place.span.start];

@@ -1,4 +1,4 @@
-//! One test per fact about Mitsuba's format that a reader easily gets wrong.
+//! One test per fact about Mitsuba's format that is easy to get wrong.
 
 use super::{OBJ, PLY, close, has_line, lacks, material, numbers, png, scene};
 
@@ -110,7 +110,7 @@ fn field_of_view_is_along_x() {
         let fov = format!(r#"<float name="fov" value="90"/><string name="fov_axis" value="{axis}"/>"#);
         close(&[of(&fov)], &[90.0], 1e-9);
     }
-    // 50 mm on the diagonal of 36 × 24 mm.
+    // A focal length of 50 mm refers to the diagonal of 36 × 24 mm.
     let half_diagonal = (36_f64 * 36.0 + 24.0 * 24.0).sqrt() / 100.0;
     let half_height = half_diagonal / 5_f64.sqrt();
     close(&[of("")], &[2.0 * half_height.atan().to_degrees()], 1e-9);
@@ -164,7 +164,7 @@ fn depth_limits_count_vertices() {
     );
 }
 
-/// The keys of the texture on a shape.
+/// The tables of a scene with one textured shape.
 fn texture_of(shape: &str, texture: &str) -> String {
     let bench = scene(&format!(
         "<shape {shape}<bsdf type=\"diffuse\"><texture name=\"reflectance\" {texture}</bsdf></shape>"
@@ -248,8 +248,8 @@ fn flat_emission_spectra_are_purple() {
 #[test]
 fn named_metals_are_integrated_like_emission() {
     let text = material(r#"<bsdf type="conductor"><string name="material" value="Au"/></bsdf>"#);
-    // Mitsuba 3.9 in RGB mode: eta = (0.1635, 0.3775, 1.2953), k = (3.8195, 2.3234, 1.7696) within the
-    // differences of the color matching functions.
+    // Mitsuba 3.9 in RGB mode: eta = (0.1635, 0.3775, 1.2953), k = (3.8195, 2.3234, 1.7696). glimt's values
+    // differ slightly, because its color matching functions do.
     let eta = numbers(&text, "eta");
     assert!(eta[0] < eta[1] && eta[1] < eta[2], "{eta:?}");
     has_line(&text, "roughness = 0");
@@ -377,7 +377,7 @@ fn environment_maps_start_at_minus_z() {
     let text = of("");
     has_line(&text, "rows = \"poles\"");
     has_line(&text, "matrix = [-1, 0, 0, 0, 1, 0, 0, 0, -1]");
-    // z up.
+    // Rotate the map to z up.
     let turned = of(r#"<transform name="to_world"><rotate x="1" angle="90"/></transform>"#);
     has_line(&turned, "matrix = [-1, 0, 0, 0, 0, 1, 0, 1, 0]");
 }
@@ -397,7 +397,7 @@ fn skies_have_z_up_and_suns_in_the_world() {
         );
         bench.toml()
     };
-    // In version 3, the turn moves the local up axis z to the world's y.
+    // In version 3, the rotation maps the local up axis z to the world's y axis.
     for version in ["3.0.0", "0.6.0"] {
         let text = of(version);
         assert!(text.contains("sky = { sun = [0.6, 0.8, 0]"), "{version}:\n{text}");
@@ -435,7 +435,7 @@ fn mirrored_rectangles_keep_their_front() {
         edge("u").cross(edge("v")).z
     };
     assert!(of("") > 0.0);
-    // The normal (0, 0, 1) is transformed, not the edges' cross product.
+    // Mitsuba transforms the normal (0, 0, 1) instead of the cross product of the edges.
     assert!(of(r#"<scale x="-1"/>"#) > 0.0);
     assert!(of(r#"<scale z="-1"/>"#) < 0.0);
 }
