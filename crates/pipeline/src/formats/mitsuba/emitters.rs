@@ -63,7 +63,7 @@ impl<'a> SceneReader<'a> {
         match self.color(object, name, ColorRole::Emission, 1.0) {
             ColorSource::Constant(color) => color,
             ColorSource::Texture(_) => {
-                let subject = format!("a texture of `{}`", shorten(&object.plugin));
+                let subject = format!("a texture in `{}`", shorten(&object.plugin));
                 self.notes.substitute_light(&subject, "replaced by white", span_of(object, name));
                 DVec3::ONE
             }
@@ -200,7 +200,7 @@ impl<'a> SceneReader<'a> {
             return self.error(object.span.clone(), "the environment's `to_world` is degenerate", None);
         };
         if x.cross(y).dot(z) < 0.0 || x.dot(y).abs().max(x.dot(z).abs()).max(y.dot(z).abs()) > 1e-4 {
-            let text = "glimt only rotates environments: the map is not mirrored or skewed";
+            let text = "the map is only rotated, not mirrored or skewed";
             self.notes.substitute_light(
                 "an environment with a mirroring or skewed `to_world`",
                 text,

@@ -238,7 +238,7 @@ impl<'a> GraphBuilder<'a> {
                     Some(&target) => {
                         self.ids.insert(copy.value.clone(), target);
                     }
-                    None => self.error(id.span.clone(), "nothing with this id precedes the alias", None),
+                    None => self.error(id.span.clone(), "no object before this alias has this id", None),
                 }
             }
             _ if VALUE_TAGS.contains(&tag) => self.add_property(parent, element),
@@ -382,7 +382,7 @@ impl<'a> GraphBuilder<'a> {
                 None => {
                     let near = nearest_name(&id, self.ids.keys().map(String::as_str).take(4096));
                     let help = near.map(|near| format!("did you mean `{near}`?"));
-                    self.error(span, format!("nothing has the id `{}`", shorten(&id)), help);
+                    self.error(span, format!("no object has the id `{}`", shorten(&id)), help);
                 }
             }
         }

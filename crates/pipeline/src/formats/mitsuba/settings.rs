@@ -141,7 +141,7 @@ impl<'a> SceneReader<'a> {
         match film.plugin.as_str() {
             "hdrfilm" | "ldrfilm" | "mfilm" | "tiledhdrfilm" | "pngfilm" | "exrfilm" => {}
             "specfilm" => {
-                let text = "the image has the colors of the CIE observer instead of the sensor's channels";
+                let text = "rendered with the colors of the CIE observer instead of the film's channels";
                 self.notes.substitute_light("`specfilm`", text, film.span.clone());
             }
             _ => self.unknown_plugin(film, "film", &["hdrfilm", "ldrfilm", "specfilm"]),
@@ -159,7 +159,7 @@ impl<'a> SceneReader<'a> {
         if self.boolean(film, "sample_border", false) || self.boolean(film, "high_quality_edges", false) {
             self.notes.note(
                 "`sample_border`",
-                "glimt samples no pixels outside of the image",
+                "glimt does not sample pixels outside the image",
                 film.span.clone(),
             );
         }
@@ -201,7 +201,7 @@ impl<'a> SceneReader<'a> {
                 if let Some(deviation) = self.float(filter, "stddev")
                     && deviation != 0.5
                 {
-                    let text = "the filter has the standard deviation 0.5";
+                    let text = "glimt's filter has a standard deviation of 0.5";
                     self.notes.note("`stddev` of `gaussian`", text, filter.span.clone());
                 }
                 "gaussian"
@@ -230,7 +230,7 @@ impl<'a> SceneReader<'a> {
         {
             self.notes.note(
                 "parameters of the filter",
-                "glimt's filter has its usual size",
+                "ignored; glimt's filters have no parameters",
                 filter.span.clone(),
             );
         }
@@ -266,7 +266,7 @@ impl<'a> SceneReader<'a> {
         let depth = if depth < 0 { UNLIMITED_DEPTH } else { (depth - 1).clamp(0, 10_000) as f64 };
         let plugin = integrator.plugin.as_str();
         if self.boolean(integrator, "hide_emitters", false) {
-            let text = "glimt shows emitters to the camera";
+            let text = "emitters stay visible to the camera";
             self.notes.substitute("`hide_emitters`", text, integrator.span.clone());
         }
         match plugin {
@@ -298,7 +298,7 @@ impl<'a> SceneReader<'a> {
             }
             "stokes" => self.refuse(integrator, "polarization"),
             "depth" | "ao" | "field" | "normals" | "albedo" => {
-                let text = "the light is rendered instead; --view shows normals, albedo and depth";
+                let text = "replaced by `path`; --view shows normals, albedo and depth";
                 self.notes.substitute_light(&format!("`{plugin}`"), text, integrator.span.clone());
                 self.document.set("integrator", "path");
                 self.document.set("max_depth", depth);
@@ -328,7 +328,7 @@ impl<'a> SceneReader<'a> {
         let skew = across.dot(up).abs().max(across.dot(forward).abs()).max(up.dot(forward).abs());
         let [width, height, depth] = [linear.x_axis, linear.y_axis, linear.z_axis].map(DVec3::length);
         if skew > 1e-4 || (width / height - 1.0).abs() > 1e-4 {
-            let text = "the image is not stretched";
+            let text = "rendered without skew or stretch";
             self.notes.substitute_light(
                 "a sensor with a skewed or stretched `to_world`",
                 text,

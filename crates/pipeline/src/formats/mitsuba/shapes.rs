@@ -141,7 +141,7 @@ impl<'a> SceneReader<'a> {
 
     /// Reports flipped normals, which glimt ignores. In Mitsuba, mirroring transforms flip normals as well.
     fn note_flipped_normals(&mut self, object: &'a PluginInstance) {
-        let text = "the front is the usual side, which matters to one-sided materials, glass and lights";
+        let text = "the front side is not flipped, which matters for one-sided materials, glass and lights";
         self.notes.substitute_light(
             "normals flipped by `flip_normals` or a mirroring `to_world`",
             text,
@@ -153,7 +153,7 @@ impl<'a> SceneReader<'a> {
     fn shape_transform(&mut self, object: &'a PluginInstance) -> Option<DMat4> {
         let matrix = self.world_matrix(object);
         if !is_invertible_affine(&matrix) {
-            let text = "left out";
+            let text = "skipped";
             self.notes.note("a shape whose `to_world` is not invertible", text, span_of(object, "to_world"));
             return None;
         }
@@ -201,7 +201,7 @@ impl<'a> SceneReader<'a> {
         let part = self.integer(object, "shape_index");
         let Some(path) = self.asset_path(name, &span, "mesh") else { return false };
         if self.is_mesh_without_area(&path, part) {
-            self.notes.note("a mesh without area", "left out", span);
+            self.notes.note("a mesh without area", "skipped", span);
             return false;
         }
         let file = self.asset_reference(&path);

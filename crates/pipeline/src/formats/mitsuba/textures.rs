@@ -174,7 +174,7 @@ impl<'a> SceneReader<'a> {
             return Some(BuiltValue::Table(vec![("texture", name.into())]));
         }
         let text = "used as √α instead of α";
-        self.notes.substitute_light("a texture of `alpha`", text, object.span.clone());
+        self.notes.substitute_light("a textured `alpha`", text, object.span.clone());
         self.number_texture(index, uv)
     }
 
@@ -257,7 +257,7 @@ impl<'a> SceneReader<'a> {
             let is_linear = is_raw || gamma == Some(1.0);
             keys.push(("encoding", if is_linear { "linear" } else { "srgb" }.into()));
         } else if usage == MitsubaTextureUse::Normal && !is_raw && !is_float {
-            let text = "decoded from sRGB in Mitsuba, but read as linear";
+            let text = "read as linear; Mitsuba decodes it from sRGB";
             self.notes.substitute_light("a normal map that is not `raw`", text, object.span.clone());
         }
         if let Some(gamma) = gamma
@@ -278,7 +278,7 @@ impl<'a> SceneReader<'a> {
             self.transform_value(object, "to_uv").map_or(DMat4::IDENTITY, |transform| transform.matrix);
         let keys = UvMap::new(&to_uv, uv, is_image).keys();
         keys.unwrap_or_else(|| {
-            let text = "left out";
+            let text = "ignored";
             self.notes.substitute_light("`to_uv` that shears the texture", text, span_of(object, "to_uv"));
             UvMap::new(&DMat4::IDENTITY, uv, is_image).keys().unwrap_or_default()
         })
@@ -313,7 +313,7 @@ impl<'a> SceneReader<'a> {
             // Mitsuba swaps the colors when it evaluates a checkerboard as a number.
             MitsubaTextureUse::Number => colors.reverse(),
             MitsubaTextureUse::Normal => {
-                self.error(object.span.clone(), "a checkerboard is not a normal map", None);
+                self.error(object.span.clone(), "a checkerboard cannot be a normal map", None);
                 return None;
             }
         }

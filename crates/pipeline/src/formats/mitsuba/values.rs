@@ -32,7 +32,7 @@ pub(super) fn parse_float(text: &str, span: &Range<usize>) -> Result<f64, ValueE
     match parsed {
         Some(number) if number.abs() <= MAX_NUMBER => Ok(number),
         Some(_) => {
-            Err(ValueError::new(span, format!("the number must be finite and at most {MAX_NUMBER:e}")))
+            Err(ValueError::new(span, format!("the number must be finite and within ±{MAX_NUMBER:e}")))
         }
         None => Err(ValueError::new(span, format!("expected a number, found `{}`", shorten(text)))),
     }
@@ -234,7 +234,7 @@ fn parse_matrix(attribute: &Attribute) -> Result<DMat4, ValueError> {
     let matrix = DMat4::from_cols_array(&rows).transpose();
     if rows[12..] != [0.0, 0.0, 0.0, 1.0] {
         let message = "the last row of the matrix must be 0 0 0 1";
-        let help = Some("glimt has no perspective transforms of objects".to_owned());
+        let help = Some("glimt does not support perspective transforms".to_owned());
         return Err(ValueError { help, ..ValueError::new(span, message) });
     }
     Ok(matrix)

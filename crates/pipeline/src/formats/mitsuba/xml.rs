@@ -100,7 +100,7 @@ impl<'a> XmlLoader<'a> {
         let Some(mut root) = self.load_file(path)? else { return Ok(None) };
         if root.tag != "scene" {
             let message = format!("the root element is <{}>, not <scene>", shorten(&root.tag));
-            let help = "this is a part of a scene: open the file that includes it".to_owned();
+            let help = "this file is part of a scene; open the file that includes it".to_owned();
             self.error(root.span.clone(), message, Some(help));
             return Ok(None);
         }
@@ -136,7 +136,7 @@ impl<'a> XmlLoader<'a> {
 
     fn report_syntax_error(&mut self, text: &str, start: usize, error: &roxmltree::Error) {
         let help = match error {
-            roxmltree::Error::DtdDetected => "remove the <!DOCTYPE …> declaration; glimt expands no entities",
+            roxmltree::Error::DtdDetected => "remove the <!DOCTYPE …> declaration; entities are unsupported",
             roxmltree::Error::NodesLimitReached => "split the scene into smaller files",
             roxmltree::Error::UnclosedRootNode | roxmltree::Error::UnexpectedCloseTag(..) => {
                 "every element needs a closing tag or `/>`"
@@ -178,7 +178,7 @@ impl<'a> XmlLoader<'a> {
             let local = attribute.range_value();
             let span = source.start + local.start..source.start + local.end.max(local.start);
             if attribute.value().len() > MAX_ATTRIBUTE_BYTES {
-                let message = format!("attribute longer than {} MiB", MAX_ATTRIBUTE_BYTES >> 20);
+                let message = format!("the attribute is longer than {} MiB", MAX_ATTRIBUTE_BYTES >> 20);
                 self.error(span.start..span.start, message, Some("store the data in a file".to_owned()));
                 return Ok(None);
             }

@@ -237,7 +237,7 @@ impl<'a> SceneReader<'a> {
             "principledthin" => {
                 self.notes.substitute_light(
                     "`principledthin`",
-                    "rendered like `principled`",
+                    "rendered as `principled`",
                     object.span.clone(),
                 );
                 Some(self.principled(object, context))

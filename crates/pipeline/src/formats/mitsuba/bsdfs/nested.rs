@@ -31,7 +31,7 @@ impl<'a> SceneReader<'a> {
         if let Some(second) = self.children_of_kind(object, ObjectKind::Bsdf).nth(1)
             && second.target != nested.target
         {
-            let text = "the first BSDF is on both sides";
+            let text = "the first BSDF is used on both sides";
             self.notes.substitute_light("`twosided` with two BSDFs", text, object.span.clone());
         }
         let context = BsdfContext { is_two_sided: true, ..context };
@@ -68,7 +68,7 @@ impl<'a> SceneReader<'a> {
             self.notes.substitute_light("`mask` around solid glass", text, object.span.clone());
             return;
         }
-        let text = "they let light from point, spot and directional lights through, which Mitsuba blocks";
+        let text = "light from point, spot and directional lights passes through them; Mitsuba blocks it";
         self.notes.note("masks", text, object.span.clone());
         let opacity = self.number(object, "opacity", 0.5);
         let value = self.number_value(opacity, context);
@@ -122,7 +122,7 @@ impl<'a> SceneReader<'a> {
         let object = self.object(index);
         let nested = self.nested_bsdf(object)?;
         if context.coat.is_some() {
-            let text = "the inner coat is left out";
+            let text = "the inner coat is ignored";
             self.notes.substitute_light("a coat on another coat", text, object.span.clone());
             return self.bsdf(nested.target, context);
         }
@@ -152,11 +152,11 @@ impl<'a> SceneReader<'a> {
     fn add_coat(&mut self, built: &mut MaterialBuilder, context: BsdfContext) {
         let Some(object) = context.coat.map(|index| self.object(index)) else { return };
         if built.is_glass {
-            let text = "the coat is left out";
+            let text = "the coat is ignored";
             self.notes.substitute_light("a coat on glass", text, object.span.clone());
             return;
         }
-        let text = "the interreflections between the coat and the base differ";
+        let text = "interreflections between coat and base differ";
         self.notes.note(&format!("`{}`", object.plugin), text, object.span.clone());
         let ior = self.relative_ior(object, 1.5046).max(1.0);
         let thickness = self.float(object, "thickness").unwrap_or(1.0);
@@ -180,7 +180,7 @@ impl<'a> SceneReader<'a> {
             }
             ColorSource::Constant(_) => {}
             ColorSource::Texture(_) => {
-                self.notes.substitute_light("a texture of `sigma_a`", "replaced by 0", object.span.clone());
+                self.notes.substitute_light("a textured `sigma_a`", "replaced by 0", object.span.clone());
             }
         }
     }
@@ -213,7 +213,7 @@ impl<'a> SceneReader<'a> {
         }
         let mut built = self.bsdf(nested.target, context)?;
         if built.is_blend || built.is_invisible || built.has("bump") {
-            let text = "the bump map is left out";
+            let text = "the bump map is ignored";
             self.notes.substitute_light(
                 "`bumpmap` around a blend or another bump map",
                 text,
@@ -248,7 +248,7 @@ impl<'a> SceneReader<'a> {
         }
         let mut built = self.bsdf(nested.target, context)?;
         if built.is_blend || built.is_invisible || built.has("normal_map") {
-            let text = "the normal map is left out";
+            let text = "the normal map is ignored";
             self.notes.substitute_light(
                 "`normalmap` around a blend or another normal map",
                 text,
@@ -268,7 +268,7 @@ impl<'a> SceneReader<'a> {
     pub(super) fn note_constant_normal_map(&mut self, constant: &'a PluginInstance) {
         let value = constant.property("value").map(|property| &property.value);
         if value != Some(&PropertyValue::Vector(DVec3::new(0.5, 0.5, 1.0))) {
-            self.notes.substitute_light("a constant normal map", "left out", constant.span.clone());
+            self.notes.substitute_light("a constant normal map", "ignored", constant.span.clone());
         }
     }
 }

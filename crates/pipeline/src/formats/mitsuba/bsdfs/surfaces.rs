@@ -130,8 +130,8 @@ impl<'a> SceneReader<'a> {
             }
             (NumberSource::Texture(_) | NumberSource::Constant(_), _) => {
                 let one = if matches!(across, NumberSource::Texture(_)) { across } else { along };
-                let text = "the roughness is isotropic";
-                self.notes.substitute_light("textures of `alpha_u` and `alpha_v`", text, object.span.clone());
+                let text = "one of them is used as isotropic roughness";
+                self.notes.substitute_light("textured `alpha_u` and `alpha_v`", text, object.span.clone());
                 let roughness = self.roughness_value(one, object, context);
                 keys.push(("roughness", roughness));
             }
@@ -251,7 +251,7 @@ impl<'a> SceneReader<'a> {
                 Some(value) => {
                     let text = "replaced by its luminance";
                     self.notes.substitute_light(
-                        "a texture of `specular_reflectance`",
+                        "a textured `specular_reflectance`",
                         text,
                         span_of(object, "specular_reflectance"),
                     );
@@ -358,7 +358,7 @@ impl<'a> SceneReader<'a> {
         let exponent = match self.number(object, "exponent", 30.0) {
             NumberSource::Constant(exponent) => exponent.clamp(0.0, 1e6),
             NumberSource::Texture(_) => {
-                self.notes.substitute_light("a texture of `exponent`", "replaced by 30", object.span.clone());
+                self.notes.substitute_light("a textured `exponent`", "replaced by 30", object.span.clone());
                 30.0
             }
         };
@@ -424,7 +424,7 @@ impl<'a> SceneReader<'a> {
             let is_zero = matches!(self.number(object, name, 0.0), NumberSource::Constant(0.0));
             if !is_zero {
                 let subject = format!("`{name}` of `{}`", object.plugin);
-                self.notes.substitute_light(&subject, "left out", span_of(object, name));
+                self.notes.substitute_light(&subject, "ignored", span_of(object, name));
             }
         }
         for name in [
@@ -442,7 +442,7 @@ impl<'a> SceneReader<'a> {
         }
         // Pure metals match Mitsuba's.
         if self.number(object, "metallic", 0.0) != NumberSource::Constant(1.0) {
-            let text = "about 2 % darker, because glimt's diffuse part is below a dielectric coat";
+            let text = "about 2 % darker, because glimt's diffuse lobe is under a dielectric coat";
             self.notes.note("`principled`", text, object.span.clone());
         }
         MaterialBuilder::one_sided("principled", keys)

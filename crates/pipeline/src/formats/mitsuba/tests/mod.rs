@@ -108,7 +108,7 @@ fn has_line(text: &str, line: &str) {
 /// Asserts that no line of `text` starts with `start`.
 #[track_caller]
 fn lacks(text: &str, start: &str) {
-    assert!(!text.lines().any(|found| found.starts_with(start)), "a line `{start}` in:\n{text}");
+    assert!(!text.lines().any(|found| found.starts_with(start)), "a line starts with `{start}` in:\n{text}");
 }
 
 /// Returns the numbers of the line `key = […]` or `key = …`.
