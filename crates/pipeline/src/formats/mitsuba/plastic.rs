@@ -193,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn nearly_smooth_coats_equal_smooth_ones() {
+    fn nearly_smooth_coats_match_smooth_coats() {
         let smooth = PlasticCoat::new(1.5, None, false);
         for is_beckmann in [false, true] {
             let rough = PlasticCoat::new(1.5, Some(0.01), is_beckmann);

@@ -425,7 +425,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn longest_parameters_are_replaced_first() {
+    fn longest_parameter_name_is_substituted() {
         let parameters = [("a", "1"), ("ab", "2"), ("c", "$a")].map(|(a, b)| (a.to_owned(), b.to_owned()));
         assert_eq!(substitute("$ab $a $abc $b", &parameters), "2 1 2c $b");
         assert_eq!(substitute("$c", &parameters), "$a");

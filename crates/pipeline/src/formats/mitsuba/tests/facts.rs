@@ -117,7 +117,7 @@ fn field_of_view_is_along_x() {
 }
 
 #[test]
-fn default_film_is_gaussian() {
+fn film_defaults_match_mitsuba() {
     let text = camera(r#"<sensor type="perspective"/>"#);
     for line in ["width = 768", "height = 576", "filter = \"gaussian\"", "samples = 4"] {
         has_line(&text, line);
@@ -213,7 +213,7 @@ fn checkerboards_swap_colors_as_numbers() {
 }
 
 #[test]
-fn masks_take_the_luminance() {
+fn masks_do_not_read_alpha() {
     for (has_alpha, line) in
         [(true, "opacity = { texture = \"a\", channel = \"r\" }"), (false, "opacity = { texture = \"a\" }")]
     {
@@ -309,7 +309,7 @@ fn gray_scales_of_metals_are_blends_with_black() {
 }
 
 #[test]
-fn coats_of_scaled_metals_are_on_both_parts() {
+fn coats_of_scaled_metals_cover_both_materials() {
     let text = material(
         r#"<bsdf type="coating"><float name="thickness" value="0.5"/><float name="sigma_a" value="2"/>
         <bsdf type="conductor"><string name="material" value="Au"/><float name="specular_reflectance" value="0.5"/></bsdf></bsdf>"#,
@@ -319,7 +319,7 @@ fn coats_of_scaled_metals_are_on_both_parts() {
 }
 
 #[test]
-fn meshes_without_area_are_left_out() {
+fn meshes_without_area_are_skipped() {
     let bench =
         scene(r#"<shape type="obj"><string name="filename" value="a.obj"/></shape><shape type="sphere"/>"#);
     bench.write("a.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n");
@@ -328,7 +328,7 @@ fn meshes_without_area_are_left_out() {
 }
 
 #[test]
-fn identity_normal_maps_are_left_out() {
+fn identity_normal_maps_are_ignored() {
     let text = material(
         r#"<bsdf type="normalmap"><texture name="normalmap" type="rawconstant"><vector name="value" value="0.5 0.5 1"/></texture>
         <bsdf type="diffuse"/></bsdf>"#,
@@ -354,7 +354,7 @@ fn plastic_is_linear_by_default() {
 }
 
 #[test]
-fn flat_meshes_are_not_smooth() {
+fn face_normals_disable_smoothing() {
     let of = |content: &str| {
         let bench =
             scene(&format!(r#"<shape type="ply"><string name="filename" value="a.ply"/>{content}</shape>"#));
@@ -383,7 +383,7 @@ fn environment_maps_start_at_minus_z() {
 }
 
 #[test]
-fn skies_have_z_up_and_suns_in_the_world() {
+fn sun_directions_are_in_world_space() {
     let of = |version: &str| {
         let bench = super::Bench::new();
         let turn = r#"<transform name="to_world"><rotate x="1" angle="-90"/></transform>"#;
@@ -406,8 +406,8 @@ fn skies_have_z_up_and_suns_in_the_world() {
 }
 
 #[test]
-fn suns_follow_the_time() {
-    // The values of Mitsuba 3.9.1 for Tokyo, 10 July 2010, in its local axes (z up).
+fn sun_position_follows_the_time() {
+    // Mitsuba 3.9.1's values for Tokyo on July 10, 2010, in its local space (z up).
     for (hour, x, y, z) in [(9, 0.095_695_2, -0.614_786, 0.782_867), (15, 0.051_385_1, 0.691_748, 0.720_308)]
     {
         let text =
