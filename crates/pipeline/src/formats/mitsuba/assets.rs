@@ -15,7 +15,7 @@ impl SceneReader<'_> {
     pub(super) fn find_file(&mut self, name: &str, span: &Range<usize>) -> Option<PathBuf> {
         let own_folder = self.files.path_at(span).and_then(Path::parent);
         let own = own_folder.map(|folder| folder.join(name));
-        // Files written on Windows have backslashes.
+        // Scenes written on Windows have backslashes in paths.
         let plain = name.replace('\\', "/");
         let names = [name, plain.as_str()];
         let folders = self.folders;

@@ -1,4 +1,4 @@
-//! Converts the values of colors, spectra and numbers.
+//! Converts colors, spectra and numbers.
 
 use std::ops::Range;
 
@@ -15,7 +15,7 @@ use crate::formats::foreign::spectra::{
 use crate::math::DVec3;
 
 impl<'a> SceneReader<'a> {
-    /// Returns a color or texture. `default` is a gray.
+    /// Returns a color or texture. `default` is a gray level.
     pub(super) fn color(
         &mut self,
         object: &'a PluginInstance,
@@ -64,7 +64,7 @@ impl<'a> SceneReader<'a> {
         }
     }
 
-    /// Returns the color of a texture with a single value.
+    /// Returns the color of a constant texture.
     fn constant_texture_color(&mut self, object: &'a PluginInstance) -> DVec3 {
         let name = if object.property("color").is_some() { "color" } else { "value" };
         match object.property(name).map(|property| &property.value) {
@@ -237,7 +237,7 @@ fn sampled_color(spectrum: &SampledSpectrum, role: ColorRole) -> DVec3 {
     }
 }
 
-/// Radiance of a blackbody, in linear Rec. 709, in the units of Mitsuba: W·sr⁻¹·m⁻² per nanometer.
+/// Radiance of a blackbody, in linear Rec. 709 and Mitsuba's units: W·sr⁻¹·m⁻² per nanometer.
 fn blackbody_color(kelvin: f64) -> DVec3 {
     xyz_to_linear_rgb(spectrum_to_xyz(|wavelength| blackbody_radiance(wavelength, kelvin))).max(DVec3::ZERO)
 }

@@ -13,7 +13,7 @@ use crate::formats::rounding::{shorten as shorten_number, shorten_color};
 use crate::math::{DMat3, DMat4, DVec3};
 use crate::scene::BuiltValue;
 
-/// Plugins that are emitters in Mitsuba 3, 2 or 0.6.
+/// Emitter plugins of Mitsuba 3, 2 and 0.6.
 const KNOWN_EMITTERS: [&str; 12] = [
     "area",
     "point",
@@ -36,7 +36,7 @@ impl<'a> SceneReader<'a> {
         object.plugin == "area" && object.id.is_some()
     }
 
-    /// Adds an emitter of the scene.
+    /// Adds an emitter that does not belong to a shape.
     pub(super) fn add_emitter(&mut self, index: usize) {
         let object = self.object(index);
         self.document.set_span_for_next_values(object.span.clone());
@@ -59,12 +59,12 @@ impl<'a> SceneReader<'a> {
         self.report_unused_children(index);
     }
 
-    /// Returns a constant color of light, and reports textures.
+    /// Returns the color of a light. Replaces textures with white and reports them.
     fn light_color(&mut self, object: &'a PluginInstance, name: &str) -> DVec3 {
         match self.color(object, name, ColorRole::Emission, 1.0) {
             ColorSource::Constant(color) => color,
             ColorSource::Texture(_) => {
-                let subject = format!("a texture of `{}`", shorten(&object.plugin));
+                let subject = format!("a texture in `{}`", shorten(&object.plugin));
                 self.notes.substitute_light(&subject, "replaced by white", span_of(object, name));
                 DVec3::ONE
             }
@@ -137,7 +137,7 @@ impl<'a> SceneReader<'a> {
         self.document.set("irradiance", shorten_color(irradiance));
     }
 
-    /// Starts the `[environment]` table. Returns false if there is one already.
+    /// Starts the `[environment]` table. Reports an error and returns false if there is one already.
     fn start_environment(&mut self, object: &'a PluginInstance) -> bool {
         if std::mem::replace(&mut self.has_environment, true) {
             let help = "remove one of them".to_owned();
@@ -203,14 +203,14 @@ impl<'a> SceneReader<'a> {
             return self.error(object.span.clone(), "the environment's `to_world` is degenerate", None);
         };
         if x.cross(y).dot(z) < 0.0 || x.dot(y).abs().max(x.dot(z).abs()).max(y.dot(z).abs()) > 1e-4 {
-            let text = "glimt only rotates environments: the map is not mirrored or skewed";
+            let text = "the map is only rotated, not mirrored or skewed";
             self.notes.substitute_light(
                 "an environment with a mirroring or skewed `to_world`",
                 text,
                 object.span.clone(),
             );
         }
-        // Orthonormalize.
+        // Orthonormalize the axes.
         let Some(x) = (x - y * x.dot(y)).try_normalize() else { return };
         let z = x.cross(y);
         let rows = DMat3::from_cols(x, y, z).transpose().to_cols_array();
@@ -260,7 +260,7 @@ impl<'a> SceneReader<'a> {
         ] {
             object.property(name);
         }
-        // An explicit direction is in the world, while a time and a place result in a local one.
+        // An explicit direction is in world space, but one computed from a time and place is in local space.
         let direction = match direction {
             Some(direction) => linear_part(&matrix).inverse() * direction,
             None => self.sun_direction(object),
@@ -268,7 +268,7 @@ impl<'a> SceneReader<'a> {
         if !self.start_environment(object) {
             return;
         }
-        // Mitsuba 3 has z up; version 0.6 has y up and gives the direction in the world.
+        // In local space, the up axis is z in Mitsuba 3 and y in version 0.6.
         let to_local =
             if object.is_old { DMat3::IDENTITY } else { DMat3::from_cols(DVec3::X, DVec3::NEG_Z, DVec3::Y) };
         let local = to_local * direction;
@@ -344,7 +344,7 @@ impl<'a> SceneReader<'a> {
             -libm::sin(hour_angle),
             libm::tan(declination) * cos_latitude - sin_latitude * cos_hour,
         );
-        // Parallax.
+        // Correct for parallax.
         let zenith = zenith + 6_371.01 / 149_597_890.0 * libm::sin(zenith);
         let (sin_zenith, cos_zenith) = (libm::sin(zenith), libm::cos(zenith));
         if object.is_old {

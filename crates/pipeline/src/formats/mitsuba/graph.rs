@@ -36,7 +36,7 @@ pub(super) enum ObjectKind {
     Volume,
 }
 
-/// Names of elements that define objects.
+/// Tags of the elements that define objects.
 const OBJECT_TAGS: [(&str, ObjectKind); 16] = [
     ("scene", ObjectKind::Scene),
     ("bsdf", ObjectKind::Bsdf),
@@ -56,7 +56,7 @@ const OBJECT_TAGS: [(&str, ObjectKind); 16] = [
     ("volume", ObjectKind::Volume),
 ];
 
-/// Names of elements that define values.
+/// Tags of the elements that define values.
 const VALUE_TAGS: [&str; 16] = [
     "float",
     "integer",
@@ -83,7 +83,7 @@ pub(super) struct PluginInstance {
     /// The plugin's name in lowercase.
     pub(super) plugin: String,
     pub(super) id: Option<String>,
-    /// Span of the plugin's name, or of the tag.
+    /// Span of the plugin's name, or of the tag if it has none.
     pub(super) span: Range<usize>,
     pub(super) properties: Vec<Property>,
     pub(super) children: Vec<Child>,
@@ -135,23 +135,23 @@ pub(super) struct SceneGraph {
 pub(super) struct GraphBuilder<'a> {
     graph: SceneGraph,
     ids: HashMap<String, ObjectIndex>,
-    /// Copies of IDs: old name, new name, span.
+    /// References to resolve when all objects are known.
     references: Vec<Reference>,
     files: &'a SourceFiles,
     pub(super) errors: Vec<Diagnostic>,
     token: &'a CancelToken,
 }
 
-/// A reference that has not been resolved yet.
+/// An unresolved reference.
 struct Reference {
     parent: ObjectIndex,
-    /// Position in the parent's children.
+    /// Index in the parent's children.
     child: usize,
     id: String,
     span: Range<usize>,
 }
 
-/// Marks references that are not resolved yet.
+/// Target of an unresolved reference.
 const UNRESOLVED: ObjectIndex = usize::MAX;
 
 impl<'a> GraphBuilder<'a> {
@@ -253,7 +253,7 @@ impl<'a> GraphBuilder<'a> {
                     Some(&target) => {
                         self.ids.insert(copy.value.clone(), target);
                     }
-                    None => self.error(id.span.clone(), "nothing with this id precedes the alias", None),
+                    None => self.error(id.span.clone(), "no object before this alias has this id", None),
                 }
             }
             _ if VALUE_TAGS.contains(&tag) => self.add_property(parent, element),
@@ -286,7 +286,7 @@ impl<'a> GraphBuilder<'a> {
         let span = element.attribute("value").map_or(element.span.clone(), |value| value.span.clone());
         let properties = &mut self.graph.objects[parent].properties;
         if let Some(known) = properties.iter_mut().find(|known| known.name == name) {
-            // Version 0.6 only warns about it.
+            // Version 0.6 only warns about duplicates.
             if !element.is_old && known.value != value {
                 return self.error(span, format!("`{}` is specified twice", shorten(&name)), None);
             }
@@ -360,7 +360,7 @@ impl<'a> GraphBuilder<'a> {
         })
     }
 
-    /// Renames properties of versions below 2 to their names in Mitsuba 3.
+    /// Converts properties of versions below 2 to those of Mitsuba 3.
     fn upgrade(&mut self, index: ObjectIndex) {
         let object = &mut self.graph.objects[index];
         if object.plugin == "diffuse" {
@@ -401,19 +401,19 @@ impl<'a> GraphBuilder<'a> {
                 None => {
                     let near = nearest_name(&id, self.ids.keys().map(String::as_str).take(4096));
                     let help = near.map(|near| format!("did you mean `{near}`?"));
-                    self.error(span, format!("nothing has the id `{}`", shorten(&id)), help);
+                    self.error(span, format!("no object has the id `{}`", shorten(&id)), help);
                 }
             }
         }
     }
 
-    /// Reports objects that contain themselves.
+    /// Reports the first object found that contains itself.
     fn report_cycles(&mut self) {
         const NEW: u8 = 0;
         const OPEN: u8 = 1;
         const DONE: u8 = 2;
         let mut states = vec![NEW; self.graph.objects.len()];
-        // Objects being visited, each with its next child.
+        // Objects being visited, each with the index of its next child.
         let mut stack = vec![(0, 0)];
         while let Some((index, next)) = stack.pop() {
             states[index] = OPEN;

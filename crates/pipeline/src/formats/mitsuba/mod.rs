@@ -1,4 +1,4 @@
-//! Reads the scenes of Mitsuba 3, 2 and 0.6.
+//! Reads scenes of Mitsuba 3, 2 and 0.6.
 //!
 //! `xml` reads the files, `graph` resolves references, and the other modules convert the objects to the tables
 //! of a scene file, which [`SceneReader`] collects.
@@ -53,7 +53,7 @@ pub(super) fn convert(
     Ok(ImportedScene { document, files, substitutions, notes })
 }
 
-/// Reads a scene. With a folder, the scene refers to copies of its assets, which are also returned.
+/// Reads a scene. With `asset_folder`, the document refers to copies in this folder, which are also returned.
 fn read_scene(
     path: &Path,
     asset_folder: Option<&str>,
@@ -86,7 +86,7 @@ fn read_scene(
             ObjectKind::Shape => {
                 reader.add_shape(child.target, ShapeTarget::SCENE);
             }
-            // A named area light is a definition that shapes refer to.
+            // A named area light only defines the emission of the shapes that refer to it.
             ObjectKind::Emitter if reader.is_named_area_light(child.target) => {}
             ObjectKind::Emitter => reader.add_emitter(child.target),
             // BSDFs, textures and media are converted where they are used.

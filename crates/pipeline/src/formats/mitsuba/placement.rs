@@ -1,4 +1,4 @@
-//! Placement of textured cylinders, and normals of mesh files.
+//! Places textured cylinders, and detects normals in mesh files.
 
 use std::f64::consts::TAU;
 use std::io::Read;
@@ -10,8 +10,8 @@ use super::textures::extension;
 use super::values::perpendicular_up;
 use crate::math::{DMat4, DVec3};
 
-/// Matrix that places a cylinder from the origin to (0, 0, 1) with radius 1, such that its texture coordinate u
-/// is Mitsuba's angle. Returns `None` if the ends coincide.
+/// Returns the matrix that places the cylinder of radius 1 from the origin to (0, 0, 1) so that its texture
+/// coordinate u follows Mitsuba's angle. Returns `None` if the ends coincide.
 pub(super) fn cylinder_matrix(matrix: &DMat4, start: DVec3, end: DVec3, radius: f64) -> Option<DMat4> {
     let axis = end - start;
     let direction = axis.try_normalize()?;
@@ -23,7 +23,7 @@ pub(super) fn cylinder_matrix(matrix: &DMat4, start: DVec3, end: DVec3, radius: 
         axis.extend(0.0),
         start.extend(1.0),
     );
-    // Turn the cylinder by the angle at which glimt's u is 0. If u runs the other way, mirror it.
+    // Rotate the cylinder so that glimt's u is 0 at angle 0. Mirror it if u runs in the opposite direction.
     let cylinder = Cylinder::new(DVec3::ZERO, DVec3::Z, 1.0, false);
     let u_at = |point: DVec3| cylinder.uv_at_point(point + DVec3::Z * 0.5).x;
     let (first, quarter) = (u_at(DVec3::X), u_at(DVec3::Y));
@@ -33,7 +33,7 @@ pub(super) fn cylinder_matrix(matrix: &DMat4, start: DVec3, end: DVec3, radius: 
     Some(*matrix * frame * mirror * turn)
 }
 
-/// Whether a mesh file has normals. Serialized files are assumed to have them.
+/// Whether a mesh file has normals. Serialized and unreadable files are assumed to have them.
 pub(super) fn has_normals(path: &Path) -> bool {
     const MAX_BYTES: u64 = 256 << 20;
     let Ok(file) = std::fs::File::open(path) else { return true };

@@ -1,17 +1,17 @@
 //! Converts the diffuse reflectance of Mitsuba's plastic to glimt's.
 //!
-//! Both have the form (1 − E(μᵢ))·(1 − E(μₒ))·kd/(π η² (1 − kd·F)), but Mitsuba's base loses the energy that
-//! single scattering in the rough coat loses: it has transmittances T and the internal reflectance R of the
-//! rough coat. With `nonlinear = false`, the default, kd in the denominator is 1.
+//! Both have the form (1 − E(μᵢ))·(1 − E(μₒ))·kd/(π η² (1 − kd·F)). For 1 − E and F, Mitsuba uses the
+//! transmittance and the internal reflectance of single scattering in the rough coat, so its base loses the
+//! energy of multiple scattering. With `nonlinear = false`, the default, kd in the denominator is 1.
 
 use std::f64::consts::TAU;
 
 use crate::formats::foreign::ior::{fresnel_reflectance, mean_fresnel_reflectance};
 
-/// Integrals of a coat.
+/// Hemispherical integrals of a coat.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PlasticCoat {
-    /// Square of the mean transmittance of Mitsuba's coat from outside.
+    /// Squared mean transmittance of Mitsuba's coat from outside.
     transmittance_squared: f64,
     /// Mean reflectance of Mitsuba's coat from inside.
     internal_reflectance: f64,
@@ -49,8 +49,8 @@ impl PlasticCoat {
         }
     }
 
-    /// Factor for a texture. With `nonlinear = false`, glimt's plastic with the same key and this factor equals
-    /// Mitsuba's. Otherwise they are equal for a reflectance of 0.5.
+    /// Returns the factor of a diffuse texture. With `nonlinear = false` in both renderers, it makes glimt's
+    /// plastic equal Mitsuba's. Otherwise, they are equal at a reflectance of 0.5.
     pub(super) fn texture_factor(&self, is_nonlinear: bool) -> f64 {
         if is_nonlinear {
             return remapped_reflectance(0.5, self, true) / 0.5;
@@ -76,15 +76,15 @@ fn mean_over_hemisphere(value: impl Fn(f64) -> f64) -> f64 {
     (0..STEPS).map(at).sum::<f64>() / f64::from(STEPS)
 }
 
-/// Like [`mean_over_hemisphere`], as Mitsuba computes it: with 64 values from 0 to 1, and without halving the
-/// weight of the last one. The result is up to 1.6 % lower.
+/// Like [`mean_over_hemisphere`], but with Mitsuba's quadrature: 64 cosines from 0 to 1 with equal weights.
+/// The result is up to 1.6 % lower.
 fn mitsuba_mean(value: impl Fn(f64) -> f64) -> f64 {
     const COUNT: u32 = 64;
     let at = |index: u32| (f64::from(index) / f64::from(COUNT - 1)).max(1e-6);
     2.0 * (0..COUNT).map(|index| value(at(index)) * at(index)).sum::<f64>() / f64::from(COUNT)
 }
 
-/// Masking and shadowing of two directions.
+/// How the masking of two directions is combined.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Masking {
     /// The product of both directions' terms, as in Mitsuba.
@@ -93,7 +93,7 @@ enum Masking {
     HeightCorrelated,
 }
 
-/// An isotropic distribution of facets.
+/// An isotropic microfacet distribution.
 #[derive(Clone, Copy)]
 struct Facets {
     alpha: f64,
@@ -101,7 +101,7 @@ struct Facets {
 }
 
 impl Facets {
-    /// Reflectance at a cosine to the normal.
+    /// Single-scattering reflectance for a direction at `cosine` to the normal.
     fn reflectance(self, cosine: f64, eta: f64, masking: Masking) -> f64 {
         self.mean_over_facets(cosine, |along, [_, _, z], [_, _, mz]| {
             let out_z = 2.0 * along * mz - z;
@@ -112,7 +112,7 @@ impl Facets {
         })
     }
 
-    /// Transmittance at a cosine to the normal, with separable masking.
+    /// Single-scattering transmittance for a direction at `cosine` to the normal, with separable masking.
     fn transmittance(self, cosine: f64, eta: f64) -> f64 {
         self.mean_over_facets(cosine, |along, [_, _, z], [_, _, mz]| {
             let reflectance = fresnel_reflectance(along, eta);
@@ -129,8 +129,8 @@ impl Facets {
         })
     }
 
-    /// Averages a function over the facets that are visible from a direction, without masking. The function
-    /// is called with the cosine between the direction and the facet, the direction, and the facet's normal.
+    /// Averages a function over the facets that face a direction, weighted by projected area but without
+    /// masking. The function takes the cosine between the direction and the facet normal, and both vectors.
     fn mean_over_facets(self, cosine: f64, value: impl Fn(f64, [f64; 3], [f64; 3]) -> f64) -> f64 {
         const HEIGHTS: u32 = 64;
         const ANGLES: u32 = 24;
@@ -163,7 +163,7 @@ impl Facets {
         }
     }
 
-    /// Smith's masking of one direction.
+    /// Smith's masking term of one direction.
     fn single_masking(self, cosine: f64) -> f64 {
         let tangent = (1.0 - cosine * cosine).max(0.0).sqrt() / cosine;
         if self.is_beckmann {
@@ -193,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn nearly_smooth_coats_equal_smooth_ones() {
+    fn nearly_smooth_coats_match_smooth_coats() {
         let smooth = PlasticCoat::new(1.5, None, false);
         for is_beckmann in [false, true] {
             let rough = PlasticCoat::new(1.5, Some(0.01), is_beckmann);
@@ -207,7 +207,7 @@ mod tests {
 
     #[test]
     fn rough_coats_are_darker_in_mitsuba() {
-        // Copying kd makes the image brighter by about 10 % at α 0.4.
+        // Using kd unchanged would make the image about 10 % brighter at α = 0.4.
         let coat = PlasticCoat::new(1.5, Some(0.4), true);
         let remapped = remapped_reflectance(0.5, &coat, true);
         assert!((0.42..0.49).contains(&remapped), "{remapped}");

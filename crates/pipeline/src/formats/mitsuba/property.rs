@@ -1,4 +1,4 @@
-//! The values of properties.
+//! Values of the properties of Mitsuba objects.
 
 use crate::formats::foreign::spectra::SampledSpectrum;
 use crate::math::{DMat4, DVec3};
@@ -22,11 +22,11 @@ pub(super) enum PropertyValue {
 pub(super) enum SpectrumValue {
     /// The same value at all wavelengths.
     Uniform(f64),
-    /// Values at wavelengths.
+    /// Values sampled at wavelengths.
     Sampled(SampledSpectrum),
     /// The name of a file with wavelengths and values.
     File(String),
-    /// Temperature of a blackbody in kelvin, and a factor.
+    /// Temperature of a blackbody in kelvin, and a scale factor.
     Blackbody(f64, f64),
 }
 
@@ -34,12 +34,12 @@ pub(super) enum SpectrumValue {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct TransformValue {
     pub(super) matrix: DMat4,
-    /// The target of the last `lookat`.
+    /// The target of the last `lookat`, moved by the steps after it.
     pub(super) target: Option<DVec3>,
 }
 
 impl PropertyValue {
-    /// The value's type as messages name it.
+    /// Name of the value's type for messages, with an article.
     pub(super) fn type_name(&self) -> &'static str {
         match self {
             Self::Boolean(_) => "a boolean",

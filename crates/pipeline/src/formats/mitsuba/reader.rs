@@ -1,4 +1,4 @@
-//! Shared state of the functions that convert a scene graph to a scene document.
+//! State shared by the functions that convert a scene graph to a scene document.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::ops::Range;
@@ -38,14 +38,14 @@ pub(super) enum ColorRole {
     Unbounded,
 }
 
-/// A color or the texture that contains it.
+/// A constant color or a texture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum ColorSource {
     Constant(DVec3),
     Texture(ObjectIndex),
 }
 
-/// A number or the texture that contains it.
+/// A constant number or a texture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum NumberSource {
     Constant(f64),
@@ -58,36 +58,36 @@ pub(super) struct SceneReader<'a> {
     pub(super) files: &'a SourceFiles,
     /// The scene file.
     pub(super) path: &'a Path,
-    /// Folders to search for assets, the last one first.
+    /// Folders to search for assets, last first.
     pub(super) folders: &'a [PathBuf],
     pub(super) options: &'a ForeignOptions,
     pub(super) token: &'a CancelToken,
     /// Loads meshes.
     pub(super) containers: &'a GltfContainers,
-    /// Folder to which an import copies the assets. `None` if they stay in place.
+    /// Folder to which an import copies the assets, or `None` if they stay in place.
     pub(super) asset_folder: Option<&'a str>,
     pub(super) errors: Vec<Diagnostic>,
     pub(super) notes: NoteCollector,
     pub(super) document: SceneDocumentBuilder,
     pub(super) companions: Vec<Companion>,
-    /// Names in the document, by kind of table.
+    /// Names used in the document, per kind of table.
     pub(super) material_names: UsedNames,
     pub(super) texture_names: UsedNames,
     pub(super) shape_names: UsedNames,
     pub(super) group_names: UsedNames,
-    /// Names of the materials that are in the document. `None` marks invisible surfaces.
+    /// Names of the converted materials. `None` marks invisible surfaces and errors.
     pub(super) materials: HashMap<MaterialKey, Option<String>>,
-    /// Names of the textures that are in the document, by their keys.
+    /// Names of the converted textures, by their formatted table entries.
     pub(super) textures: HashMap<String, String>,
     /// Names of the groups in the document. `None` marks groups without visible shapes.
     pub(super) groups: HashMap<ObjectIndex, Option<String>>,
-    /// Names of the files that an import writes, by source.
+    /// Names of the files that an import writes, by source path.
     pub(super) asset_names: BTreeMap<PathBuf, String>,
     pub(super) used_asset_names: HashSet<String>,
     /// Properties reported as unused.
     pub(super) reported_unused: HashSet<ObjectIndex>,
     pub(super) has_environment: bool,
-    /// Name of the black material, if it is in the document.
+    /// Name of the black material, if the document has one.
     pub(super) black: Option<String>,
     /// Integrals of plastic coats, by index of refraction, α and distribution.
     pub(super) plastic_coats: HashMap<(u64, Option<u64>, bool), PlasticCoat>,
@@ -211,7 +211,7 @@ impl<'a> SceneReader<'a> {
         &self.graph.objects[index]
     }
 
-    /// Reports an error.
+    /// Reports an error, unless there are `MAX_ERRORS` already.
     pub(super) fn error(&mut self, span: Range<usize>, message: impl Into<String>, help: Option<String>) {
         if self.errors.len() < MAX_ERRORS {
             self.errors.push(self.files.diagnostic(Severity::Error, span, message, "", help));
@@ -219,14 +219,14 @@ impl<'a> SceneReader<'a> {
         self.has_stopped |= self.errors.len() >= MAX_ERRORS;
     }
 
-    /// Reports a feature that glimt lacks and cannot replace.
+    /// Reports an error for a feature that glimt neither supports nor substitutes.
     pub(super) fn refuse(&mut self, object: &PluginInstance, what: &str) {
         let message = format!("glimt does not render {what} (`{}`)", shorten(&object.plugin));
         let help = "remove it, or render this scene with Mitsuba".to_owned();
         self.error(object.span.clone(), message, Some(help));
     }
 
-    /// Reports a plugin that neither Mitsuba nor glimt knows.
+    /// Reports an unknown plugin, and suggests a similar name from `known`.
     pub(super) fn unknown_plugin(&mut self, object: &PluginInstance, kind: &str, known: &[&str]) {
         let near = nearest_name(&object.plugin, known.iter().copied());
         let help = match near {
@@ -247,7 +247,7 @@ impl<'a> SceneReader<'a> {
         self.error(span.clone(), message, None);
     }
 
-    /// Returns a number.
+    /// Returns a numeric property. Other types are errors.
     pub(super) fn float(&mut self, object: &PluginInstance, name: &str) -> Option<f64> {
         let property = object.property(name)?;
         match &property.value {
@@ -261,7 +261,7 @@ impl<'a> SceneReader<'a> {
         }
     }
 
-    /// Returns an integer.
+    /// Returns an integer property. Other types are errors.
     pub(super) fn integer(&mut self, object: &PluginInstance, name: &str) -> Option<i64> {
         let property = object.property(name)?;
         match &property.value {
@@ -274,7 +274,7 @@ impl<'a> SceneReader<'a> {
         }
     }
 
-    /// Returns a boolean.
+    /// Returns a boolean property, or `default`. Other types are errors.
     pub(super) fn boolean(&mut self, object: &PluginInstance, name: &str, default: bool) -> bool {
         let Some(property) = object.property(name) else { return default };
         match &property.value {
@@ -286,7 +286,7 @@ impl<'a> SceneReader<'a> {
         }
     }
 
-    /// Returns a string and its span.
+    /// Returns a string property and its span. Other types are errors.
     pub(super) fn text(&mut self, object: &'a PluginInstance, name: &str) -> Option<(&'a str, Range<usize>)> {
         let property = object.property(name)?;
         match &property.value {
@@ -298,7 +298,7 @@ impl<'a> SceneReader<'a> {
         }
     }
 
-    /// Returns a vector.
+    /// Returns a vector property. Other types are errors.
     pub(super) fn vector(&mut self, object: &PluginInstance, name: &str) -> Option<DVec3> {
         let property = object.property(name)?;
         match &property.value {
@@ -310,7 +310,7 @@ impl<'a> SceneReader<'a> {
         }
     }
 
-    /// Returns a transform.
+    /// Returns a transform property. Other types are errors.
     pub(super) fn transform_value(&mut self, object: &PluginInstance, name: &str) -> Option<TransformValue> {
         let property = object.property(name)?;
         match &property.value {
@@ -345,9 +345,9 @@ impl<'a> SceneReader<'a> {
         }
     }
 
-    /// Notes properties of an object that no function has read.
+    /// Adds a note for each property of an object that has not been read.
     pub(super) fn report_unused(&mut self, index: ObjectIndex) {
-        /// Properties without an effect on the image in glimt.
+        /// Properties that do not affect glimt's images.
         const IRRELEVANT: [&str; 12] = [
             "name",
             "sample_visible",

@@ -12,9 +12,9 @@ use crate::math::{DMat4, DVec3};
 const DEFAULT_FILM_SIZE: [i64; 2] = [768, 576];
 /// Maximum width and height of an image.
 const MAX_SIZE: i64 = 65_536;
-/// Diagonal of 35 mm film in millimeters, to which focal lengths refer.
+/// Diagonal of 35 mm film in millimeters, the reference for focal lengths.
 const FILM_DIAGONAL: f64 = 43.266_615_305_567_87;
-/// Bounces for integrators without a depth limit.
+/// `max_depth` for integrators without a depth limit.
 const UNLIMITED_DEPTH: f64 = 1000.0;
 
 /// Integrators that solve the whole rendering equation.
@@ -51,9 +51,9 @@ const WRAPPERS: [&str; 5] = ["moment", "aov", "multichannel", "adaptive", "irrca
 struct FilmWindow {
     /// Size of the whole film.
     size: [f64; 2],
-    /// Offset of the rendered part.
+    /// Offset of the crop window.
     crop_offset: [f64; 2],
-    /// Size of the rendered part.
+    /// Size of the crop window.
     crop_size: [f64; 2],
 }
 
@@ -68,8 +68,8 @@ impl FilmWindow {
         self.crop_size[1] / self.size[1]
     }
 
-    /// Offset of the rendered part's center from the film's center, to the right and up, in heights of the
-    /// rendered part.
+    /// Offset of the crop window's center from the film's center, to the right and up, in units of the crop
+    /// window's height.
     fn shift(&self) -> [f64; 2] {
         let offset =
             |axis: usize| self.crop_offset[axis] + self.crop_size[axis] / 2.0 - self.size[axis] / 2.0;
@@ -104,7 +104,7 @@ impl<'a> SceneReader<'a> {
         self.report_unused_settings(scene, sensor_index);
     }
 
-    /// Returns the sensor to use.
+    /// Returns the sensor selected with `--sensor`, or the first one.
     fn select_sensor(&mut self, scene: &'a PluginInstance) -> Option<&'a Child> {
         let sensors: Vec<&Child> = self.children_of_kind(scene, ObjectKind::Sensor).collect();
         if sensors.is_empty() {
@@ -147,7 +147,7 @@ impl<'a> SceneReader<'a> {
         match film.plugin.as_str() {
             "hdrfilm" | "ldrfilm" | "mfilm" | "tiledhdrfilm" | "pngfilm" | "exrfilm" => {}
             "specfilm" => {
-                let text = "the image has the colors of the CIE observer instead of the sensor's channels";
+                let text = "rendered with the colors of the CIE observer instead of the film's channels";
                 self.notes.substitute_light("`specfilm`", text, film.span.clone());
             }
             _ => self.unknown_plugin(film, "film", &["hdrfilm", "ldrfilm", "specfilm"]),
@@ -165,7 +165,7 @@ impl<'a> SceneReader<'a> {
         if self.boolean(film, "sample_border", false) || self.boolean(film, "high_quality_edges", false) {
             self.notes.note(
                 "`sample_border`",
-                "glimt samples no pixels outside of the image",
+                "glimt does not sample pixels outside the image",
                 film.span.clone(),
             );
         }
@@ -207,7 +207,7 @@ impl<'a> SceneReader<'a> {
                 if let Some(deviation) = self.float(filter, "stddev")
                     && deviation != 0.5
                 {
-                    let text = "the filter has the standard deviation 0.5";
+                    let text = "glimt's filter has a standard deviation of 0.5";
                     self.notes.note("`stddev` of `gaussian`", text, filter.span.clone());
                 }
                 "gaussian"
@@ -236,7 +236,7 @@ impl<'a> SceneReader<'a> {
         {
             self.notes.note(
                 "parameters of the filter",
-                "glimt's filter has its usual size",
+                "ignored; glimt's filters have no parameters",
                 filter.span.clone(),
             );
         }
@@ -246,7 +246,7 @@ impl<'a> SceneReader<'a> {
     fn add_integrator(&mut self, scene: &'a PluginInstance) {
         let mut integrator = self.children_of_kind(scene, ObjectKind::Integrator).next();
         let mut nested = 0;
-        // Integrators that add channels contain the integrator of the light.
+        // Integrators that add channels wrap the integrator that computes the light.
         while let Some(child) = integrator {
             let object = self.object(child.target);
             if !WRAPPERS.contains(&object.plugin.as_str()) || nested > 8 {
@@ -272,7 +272,7 @@ impl<'a> SceneReader<'a> {
         let depth = if depth < 0 { UNLIMITED_DEPTH } else { (depth - 1).clamp(0, 10_000) as f64 };
         let plugin = integrator.plugin.as_str();
         if self.boolean(integrator, "hide_emitters", false) {
-            let text = "glimt shows emitters to the camera";
+            let text = "emitters stay visible to the camera";
             self.notes.substitute("`hide_emitters`", text, integrator.span.clone());
         }
         match plugin {
@@ -304,7 +304,7 @@ impl<'a> SceneReader<'a> {
             }
             "stokes" => self.refuse(integrator, "polarization"),
             "depth" | "ao" | "field" | "normals" | "albedo" => {
-                let text = "the light is rendered instead; --view shows normals, albedo and depth";
+                let text = "replaced by `path`; --view shows normals, albedo and depth";
                 self.notes.substitute_light(&format!("`{plugin}`"), text, integrator.span.clone());
                 self.document.set("integrator", "path");
                 self.document.set("max_depth", depth);
@@ -334,7 +334,7 @@ impl<'a> SceneReader<'a> {
         let skew = across.dot(up).abs().max(across.dot(forward).abs()).max(up.dot(forward).abs());
         let [width, height, depth] = [linear.x_axis, linear.y_axis, linear.z_axis].map(DVec3::length);
         if skew > 1e-4 || (width / height - 1.0).abs() > 1e-4 {
-            let text = "the image is not stretched";
+            let text = "rendered without skew or stretch";
             self.notes.substitute_light(
                 "a sensor with a skewed or stretched `to_world`",
                 text,
@@ -369,7 +369,7 @@ impl<'a> SceneReader<'a> {
                 }
             }
             "orthographic" | "telecentric" => {
-                // The film spans −1 … 1 along x in the sensor's coordinates.
+                // The film spans −1 to 1 along x in the sensor's space.
                 self.document.set("projection", "orthographic");
                 self.document.set("view_height", 2.0 * width / window.aspect() * window.height_fraction());
                 if plugin == "telecentric" {

@@ -15,7 +15,7 @@ use crate::formats::foreign::transform::{
 };
 use crate::math::{DMat4, DVec3};
 
-/// Plugins that are shapes in Mitsuba 3, 2 or 0.6.
+/// Shape plugins of Mitsuba 3, 2 and 0.6.
 const KNOWN_SHAPES: [&str; 18] = [
     "obj",
     "ply",
@@ -42,8 +42,8 @@ const NO_USABLE_FACE: &str = "no usable face";
 /// Maximum depth of nested shapes.
 const MAX_DEPTH: u32 = 16;
 
-/// Corners of a cube's faces in the order of Mitsuba's vertices. The bits of a corner are the signs of its
-/// coordinates.
+/// Corners of a cube's faces, in the order of Mitsuba's vertices. Bit i of a corner is set if coordinate i is
+/// positive.
 const CUBE_FACES: [[u32; 4]; 6] =
     [[1, 5, 4, 0], [3, 2, 6, 7], [1, 3, 7, 5], [5, 7, 6, 4], [4, 6, 2, 0], [3, 1, 0, 2]];
 
@@ -151,9 +151,9 @@ impl<'a> SceneReader<'a> {
         self.material(bsdf, emitter, uv, object)
     }
 
-    /// Reports flipped normals, which glimt ignores. In Mitsuba, mirroring transforms also flip normals.
+    /// Reports flipped normals, which glimt ignores. In Mitsuba, mirroring transforms flip normals as well.
     fn note_flipped_normals(&mut self, object: &'a PluginInstance) {
-        let text = "the front is the usual side, which matters to one-sided materials, glass and lights";
+        let text = "the front side is not flipped, which matters for one-sided materials, glass and lights";
         self.notes.substitute_light(
             "normals flipped by `flip_normals` or a mirroring `to_world`",
             text,
@@ -165,7 +165,7 @@ impl<'a> SceneReader<'a> {
     fn shape_transform(&mut self, object: &'a PluginInstance) -> Option<DMat4> {
         let matrix = self.world_matrix(object);
         if !is_invertible_affine(&matrix) {
-            let text = "left out";
+            let text = "skipped";
             self.notes.note("a shape whose `to_world` is not invertible", text, span_of(object, "to_world"));
             return None;
         }
@@ -220,7 +220,7 @@ impl<'a> SceneReader<'a> {
         let part = self.integer(object, "shape_index");
         let Some(path) = self.asset_path(name, &span, "mesh") else { return false };
         if self.is_mesh_without_area(&path, part) {
-            self.notes.note("a mesh without area", "left out", span);
+            self.notes.note("a mesh without area", "skipped", span);
             return false;
         }
         let file = self.asset_reference(&path);

@@ -10,7 +10,7 @@ use crate::formats::rounding::{shorten as shorten_number, shorten_color};
 use crate::math::{DMat4, DVec3};
 use crate::scene::BuiltValue;
 
-/// The use of a texture.
+/// Purpose of a texture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum MitsubaTextureUse {
     Color,
@@ -18,13 +18,13 @@ pub(super) enum MitsubaTextureUse {
     Normal,
 }
 
-/// Extensions of images with linear floating-point values.
+/// Extensions of images with linear floating-point pixels.
 const FLOAT_IMAGES: [&str; 4] = ["exr", "hdr", "pfm", "rgbe"];
 /// Extensions of images that glimt reads.
 const IMAGES: [&str; 14] =
     ["png", "jpg", "jpeg", "ppm", "pgm", "pbm", "pfm", "tga", "bmp", "hdr", "rgbe", "exr", "webp", "apng"];
 
-/// A map of texture coordinates: a linear map of two rows, then an offset.
+/// An affine map of texture coordinates: a 2 × 2 matrix in rows, then an offset.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct UvMap {
     rows: [[f64; 2]; 2],
@@ -71,7 +71,7 @@ impl UvMap {
         if angle != 0.0 {
             keys.push(("rotate", shorten_number(angle).into()));
         }
-        // Whole repetitions do not matter to repeated textures, but they do to clamped ones.
+        // Keep integer offsets: they do not affect repeated textures, but they do affect clamped ones.
         if self.offset != [0.0; 2] {
             keys.push(("offset", self.offset.map(shorten_number).into()));
         }
@@ -91,7 +91,7 @@ impl<'a> SceneReader<'a> {
         self.texture_with_factor(index, usage, uv, 1.0)
     }
 
-    /// Like [`Self::texture`], with a factor on the colors.
+    /// Like [`Self::texture`], with the colors multiplied by `factor`.
     pub(super) fn texture_with_factor(
         &mut self,
         index: ObjectIndex,
@@ -157,7 +157,7 @@ impl<'a> SceneReader<'a> {
         Some(name)
     }
 
-    /// The color that replaces a texture without an image.
+    /// Returns the color of a spectrum that is used in place of a texture.
     pub(super) fn constant_of_texture(&mut self, index: ObjectIndex, role: ColorRole) -> Option<DVec3> {
         let object = self.object(index);
         match object.kind {
@@ -166,22 +166,22 @@ impl<'a> SceneReader<'a> {
         }
     }
 
-    /// Returns the value that reads a number from a texture.
+    /// Returns the value of a number key that reads a texture.
     pub(super) fn number_texture(&mut self, index: ObjectIndex, uv: UvConvention) -> Option<BuiltValue> {
         let name = self.texture(index, MitsubaTextureUse::Number, uv)?;
         Some(self.channel_value(index, name))
     }
 
-    /// Returns the value of a roughness √α whose α is a texture.
+    /// Returns the value of `roughness`, which is √α, for a texture of α.
     pub(super) fn roughness_texture(&mut self, index: ObjectIndex, uv: UvConvention) -> Option<BuiltValue> {
         let object = self.object(index);
         if object.plugin == "checkerboard" {
-            // The two values can be converted exactly.
+            // Convert both values exactly.
             let name = self.checkerboard_of_roots(index, uv)?;
             return Some(BuiltValue::Table(vec![("texture", name.into())]));
         }
         let text = "used as √α instead of α";
-        self.notes.substitute_light("a texture of `alpha`", text, object.span.clone());
+        self.notes.substitute_light("a textured `alpha`", text, object.span.clone());
         self.number_texture(index, uv)
     }
 
@@ -191,8 +191,8 @@ impl<'a> SceneReader<'a> {
         Some(name.into())
     }
 
-    /// Returns the value that reads the luminance of a texture as a number. Images with an alpha channel need
-    /// a channel, because glimt's opacity is alpha by default.
+    /// Returns the value of a number key that reads the texture `name`. Selects the red channel if the image
+    /// may have alpha, which `opacity` reads by default.
     fn channel_value(&mut self, index: ObjectIndex, name: String) -> BuiltValue {
         let object = self.object(index);
         let has_alpha = self.image_may_have_alpha(object);
@@ -203,7 +203,7 @@ impl<'a> SceneReader<'a> {
         BuiltValue::Table(entries)
     }
 
-    /// Whether an image may have an alpha channel: reads the color type of PNG files.
+    /// Whether an image may have an alpha channel, from the color type of a PNG file or the file extension.
     fn image_may_have_alpha(&mut self, object: &'a PluginInstance) -> bool {
         let Some((name, span)) = self.text(object, "filename") else { return false };
         let Some(path) = self.find_file(name, &span) else { return false };
@@ -264,7 +264,7 @@ impl<'a> SceneReader<'a> {
             let is_linear = is_raw || gamma == Some(1.0);
             keys.push(("encoding", if is_linear { "linear" } else { "srgb" }.into()));
         } else if usage == MitsubaTextureUse::Normal && !is_raw && !is_float {
-            let text = "decoded from sRGB in Mitsuba, but read as linear";
+            let text = "read as linear; Mitsuba decodes it from sRGB";
             self.notes.substitute_light("a normal map that is not `raw`", text, object.span.clone());
         }
         if let Some(gamma) = gamma
@@ -285,7 +285,7 @@ impl<'a> SceneReader<'a> {
             self.transform_value(object, "to_uv").map_or(DMat4::IDENTITY, |transform| transform.matrix);
         let keys = UvMap::new(&to_uv, uv, is_image).keys();
         keys.unwrap_or_else(|| {
-            let text = "left out";
+            let text = "ignored";
             self.notes.substitute_light("`to_uv` that shears the texture", text, span_of(object, "to_uv"));
             UvMap::new(&DMat4::IDENTITY, uv, is_image).keys().unwrap_or_default()
         })
@@ -320,7 +320,7 @@ impl<'a> SceneReader<'a> {
             // Mitsuba swaps the colors when it evaluates a checkerboard as a number.
             MitsubaTextureUse::Number => colors.reverse(),
             MitsubaTextureUse::Normal => {
-                self.error(object.span.clone(), "a checkerboard is not a normal map", None);
+                self.error(object.span.clone(), "a checkerboard cannot be a normal map", None);
                 return None;
             }
         }

@@ -32,7 +32,7 @@ pub(super) fn parse_float(text: &str, span: &Range<usize>) -> Result<f64, ValueE
     match parsed {
         Some(number) if number.abs() <= MAX_NUMBER => Ok(number),
         Some(_) => {
-            Err(ValueError::new(span, format!("the number must be finite and at most {MAX_NUMBER:e}")))
+            Err(ValueError::new(span, format!("the number must be finite and within ±{MAX_NUMBER:e}")))
         }
         None => Err(ValueError::new(span, format!("expected a number, found `{}`", shorten(text)))),
     }
@@ -50,7 +50,7 @@ pub(super) fn parse_boolean(text: &str, span: &Range<usize>) -> Result<bool, Val
     }
 }
 
-/// Splits text at spaces and commas.
+/// Splits text at whitespace and commas.
 fn words(text: &str) -> impl Iterator<Item = &str> {
     text.split(|c: char| c.is_whitespace() || c == ',').filter(|word| !word.is_empty())
 }
@@ -72,7 +72,7 @@ pub(super) fn parse_numbers<const N: usize>(text: &str, span: &Range<usize>) -> 
     }
 }
 
-/// Parses one number, which is used three times, or three numbers.
+/// Parses three numbers, or one number that is used for all three components.
 fn parse_one_or_three(text: &str, span: &Range<usize>) -> Result<DVec3, ValueError> {
     match words(text).count() {
         1 => Ok(DVec3::splat(parse_float(words(text).next().unwrap_or_default(), span)?)),
@@ -81,7 +81,7 @@ fn parse_one_or_three(text: &str, span: &Range<usize>) -> Result<DVec3, ValueErr
     }
 }
 
-/// Parses a linear color. Hexadecimal colors, which version 0.6 allows, are in sRGB.
+/// Parses a linear color. Hexadecimal colors, which version 0.6 allows, are sRGB.
 pub(super) fn parse_rgb(text: &str, span: &Range<usize>) -> Result<DVec3, ValueError> {
     if text.starts_with('#') { parse_hexadecimal(text, span) } else { parse_one_or_three(text, span) }
 }
@@ -104,7 +104,7 @@ fn parse_hexadecimal(text: &str, span: &Range<usize>) -> Result<DVec3, ValueErro
     Ok(DVec3::new(part(16), part(8), part(0)))
 }
 
-/// Parses a number, three numbers for red, green and blue, or pairs of wavelength and value.
+/// Parses a number, an RGB color, or pairs of wavelength and value.
 pub(super) fn parse_spectrum(attribute: &Attribute) -> Result<PropertyValue, ValueError> {
     let (text, span) = (attribute.value.trim(), &attribute.span);
     if !text.contains(':') {
@@ -131,8 +131,8 @@ pub(super) fn parse_spectrum(attribute: &Attribute) -> Result<PropertyValue, Val
     Ok(PropertyValue::Spectrum(SpectrumValue::Sampled(spectrum)))
 }
 
-/// Parses `x`, `y` and `z`, or `value` with one or three numbers. Missing components have the default value,
-/// or are errors.
+/// Parses `x`, `y` and `z`, or `value` with one or three numbers. Missing components are `default`, or errors
+/// if it is `None`.
 pub(super) fn parse_point(element: &Element, default: Option<f64>) -> Result<DVec3, ValueError> {
     if let Some(value) = element.attribute("value") {
         return parse_one_or_three(&value.value, &value.span);
@@ -150,7 +150,7 @@ pub(super) fn parse_point(element: &Element, default: Option<f64>) -> Result<DVe
 /// Names of the steps of a transform.
 const STEPS: [&str; 5] = ["translate", "rotate", "scale", "lookat", "matrix"];
 
-/// Parses a transform. Its steps apply in order, each to the result of the previous ones.
+/// Parses a transform. Its steps apply in order, each to the result of the previous step.
 pub(super) fn parse_transform(element: &Element) -> Result<TransformValue, ValueError> {
     let mut transform = TransformValue { matrix: DMat4::IDENTITY, target: None };
     for step in &element.children {
@@ -242,7 +242,7 @@ pub(super) fn perpendicular_up(n: DVec3) -> DVec3 {
     DVec3::new(1.0 + sign * n.x * n.x * a, sign * n.x * n.y * a, -sign * n.x)
 }
 
-/// Parses 9 or 16 numbers, row by row.
+/// Parses a 3 × 3 or 4 × 4 matrix in row-major order.
 fn parse_matrix(attribute: &Attribute) -> Result<DMat4, ValueError> {
     let (text, span) = (attribute.value.as_str(), &attribute.span);
     let rows = match words(text).count() {
@@ -256,7 +256,7 @@ fn parse_matrix(attribute: &Attribute) -> Result<DMat4, ValueError> {
     let matrix = DMat4::from_cols_array(&rows).transpose();
     if rows[12..] != [0.0, 0.0, 0.0, 1.0] {
         let message = "the last row of the matrix must be 0 0 0 1";
-        let help = Some("glimt has no perspective transforms of objects".to_owned());
+        let help = Some("glimt does not support perspective transforms".to_owned());
         return Err(ValueError { help, ..ValueError::new(span, message) });
     }
     Ok(matrix)

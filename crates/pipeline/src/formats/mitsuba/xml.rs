@@ -1,4 +1,4 @@
-//! Reads the XML files of a Mitsuba scene: includes, default values and parameters.
+//! Reads the XML files of a Mitsuba scene, and resolves includes, defaults and parameters.
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -17,11 +17,11 @@ const MAX_INCLUDE_DEPTH: usize = 15;
 const MAX_DEPTH: usize = 64;
 /// Maximum number of XML nodes in a file.
 const MAX_NODES: u32 = 4 << 20;
-/// Maximum length of an attribute, which is ample for a spectrum.
+/// Maximum length of an attribute. Ample for a spectrum.
 const MAX_ATTRIBUTE_BYTES: usize = 4 << 20;
-/// Maximum length of an attribute after substitution, and maximum length of a parameter.
+/// Maximum length of a parameter, and of an attribute after substitution.
 const MAX_SUBSTITUTED_BYTES: usize = 64 << 10;
-/// Maximum number of bytes that substitutions add to a scene.
+/// Maximum total length of the attributes of a scene that contain parameters.
 const MAX_ADDED_BYTES: usize = 32 << 20;
 /// Maximum number of errors reported.
 pub(super) const MAX_ERRORS: usize = 100;
@@ -32,9 +32,9 @@ pub(super) struct Element {
     pub(super) tag: String,
     pub(super) attributes: Vec<Attribute>,
     pub(super) children: Vec<Element>,
-    /// The element's name in its start tag.
+    /// Span of the element's name in its start tag.
     pub(super) span: Range<usize>,
-    /// Whether the file's version is below 2, so that names are written in camel case.
+    /// Whether the file's version is below 2, in which names are in camel case.
     pub(super) is_old: bool,
 }
 
@@ -43,17 +43,17 @@ pub(super) struct Element {
 pub(super) struct Attribute {
     pub(super) name: String,
     pub(super) value: String,
-    /// The value without quotes.
+    /// Span of the value, without the quotes.
     pub(super) span: Range<usize>,
 }
 
 impl Element {
-    /// Returns an attribute.
+    /// Returns the attribute called `name`.
     pub(super) fn attribute(&self, name: &str) -> Option<&Attribute> {
         self.attributes.iter().find(|one| one.name == name)
     }
 
-    /// Returns an attribute's value.
+    /// Returns the value of the attribute called `name`.
     pub(super) fn value(&self, name: &str) -> Option<&str> {
         self.attribute(name).map(|one| one.value.as_str())
     }
@@ -63,13 +63,13 @@ impl Element {
 pub(super) struct XmlLoader<'a> {
     pub(super) reader: SourceReader,
     pub(super) errors: Vec<Diagnostic>,
-    /// Folders to search for files, the last one first.
+    /// Folders to search for files, last first.
     pub(super) folders: Vec<PathBuf>,
-    /// Names and values of the parameters. The first definition counts.
+    /// Names and values of the parameters. The first definition takes precedence.
     parameters: Vec<(String, String)>,
-    /// The files that are being read, to detect cycles.
+    /// Files being read, outermost first, to detect include cycles.
     open: Vec<PathBuf>,
-    /// Number of bytes in substituted attributes.
+    /// Total length of the attributes substituted so far.
     substituted_bytes: usize,
     token: &'a CancelToken,
 }
@@ -78,7 +78,7 @@ impl<'a> XmlLoader<'a> {
     pub(super) fn new(scene: &Path, defines: &[(String, String)], token: &'a CancelToken) -> Self {
         let folder = scene.parent().unwrap_or(Path::new("")).to_owned();
         let mut parameters: Vec<(String, String)> = Vec::new();
-        // On the command line, the last value counts.
+        // If `-D` repeats a name, the last value takes precedence.
         for (name, value) in defines.iter().rev() {
             if !parameters.iter().any(|(known, _)| known == name) {
                 parameters.push((name.clone(), value.clone()));
@@ -88,7 +88,7 @@ impl<'a> XmlLoader<'a> {
         Self { reader, errors, folders: vec![folder], parameters, open, substituted_bytes: 0, token }
     }
 
-    /// Reports an error.
+    /// Reports an error, unless there are `MAX_ERRORS` already.
     pub(super) fn error(&mut self, span: Range<usize>, message: impl Into<String>, help: Option<String>) {
         if self.errors.len() < MAX_ERRORS {
             self.errors.push(self.reader.files.diagnostic(Severity::Error, span, message, "", help));
@@ -100,7 +100,7 @@ impl<'a> XmlLoader<'a> {
         let Some(mut root) = self.load_file(path)? else { return Ok(None) };
         if root.tag != "scene" {
             let message = format!("the root element is <{}>, not <scene>", shorten(&root.tag));
-            let help = "this is a part of a scene: open the file that includes it".to_owned();
+            let help = "this file is part of a scene; open the file that includes it".to_owned();
             self.error(root.span.clone(), message, Some(help));
             return Ok(None);
         }
@@ -137,7 +137,7 @@ impl<'a> XmlLoader<'a> {
 
     fn report_syntax_error(&mut self, text: &str, start: usize, error: &roxmltree::Error) {
         let help = match error {
-            roxmltree::Error::DtdDetected => "remove the <!DOCTYPE …> declaration; glimt expands no entities",
+            roxmltree::Error::DtdDetected => "remove the <!DOCTYPE …> declaration; entities are unsupported",
             roxmltree::Error::NodesLimitReached => "split the scene into smaller files",
             roxmltree::Error::UnclosedRootNode | roxmltree::Error::UnexpectedCloseTag(..) => {
                 "every element needs a closing tag or `/>`"
@@ -161,7 +161,7 @@ impl<'a> XmlLoader<'a> {
         self.error(start + offset..start + offset + next, shorten(&message), Some(help.to_owned()));
     }
 
-    /// Converts a node and its children. Replaces includes with the included elements.
+    /// Converts a node and its children, and replaces includes with the included elements.
     fn convert(
         &mut self,
         node: &Node<'_, '_>,
@@ -180,7 +180,7 @@ impl<'a> XmlLoader<'a> {
             let local = attribute.range_value();
             let span = source.start + local.start..source.start + local.end.max(local.start);
             if attribute.value().len() > MAX_ATTRIBUTE_BYTES {
-                let message = format!("attribute longer than {} MiB", MAX_ATTRIBUTE_BYTES >> 20);
+                let message = format!("the attribute is longer than {} MiB", MAX_ATTRIBUTE_BYTES >> 20);
                 self.error(span.start..span.start, message, Some("store the data in a file".to_owned()));
                 return Ok(None);
             }
@@ -363,13 +363,13 @@ impl<'a> XmlLoader<'a> {
 /// A file that is being converted.
 struct FileSource<'a> {
     text: &'a str,
-    /// Offset of the text in all texts.
+    /// Offset of the text among all source files.
     start: usize,
     is_old: bool,
     path: &'a Path,
 }
 
-/// Replaces `$name` with the parameters' values, the longest names first.
+/// Replaces each `$name` with the value of the parameter. The longest matching name is used.
 fn substitute(text: &str, parameters: &[(String, String)]) -> String {
     if !text.contains('$') {
         return text.to_owned();
@@ -430,7 +430,7 @@ fn offset_of(text: &str, position: TextPos) -> usize {
     start + inside
 }
 
-/// Whether two paths name the same file.
+/// Whether two paths refer to the same file.
 fn same_file(a: &Path, b: &Path) -> bool {
     match (a.canonicalize(), b.canonicalize()) {
         (Ok(a), Ok(b)) => a == b,
@@ -438,7 +438,7 @@ fn same_file(a: &Path, b: &Path) -> bool {
     }
 }
 
-/// Shortens user text for messages.
+/// Truncates text from the scene for messages, and removes control characters.
 pub(super) fn shorten(text: &str) -> String {
     const MAX_CHARS: usize = 120;
     let mut shown: String = text.chars().filter(|c| !c.is_control()).take(MAX_CHARS).collect();
@@ -453,7 +453,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn longest_parameters_are_replaced_first() {
+    fn longest_parameter_name_is_substituted() {
         let parameters = [("a", "1"), ("ab", "2"), ("c", "$a")].map(|(a, b)| (a.to_owned(), b.to_owned()));
         assert_eq!(substitute("$ab $a $abc $b", &parameters), "2 1 2c $b");
         assert_eq!(substitute("$c", &parameters), "$a");

@@ -12,10 +12,10 @@ use crate::formats::rounding::{shorten as shorten_number, shorten_color};
 use crate::math::DVec3;
 use crate::scene::BuiltValue;
 
-/// Index of refraction of air, Mitsuba's usual exterior.
+/// Index of refraction of air, Mitsuba's default exterior.
 const AIR: f64 = 1.000_277;
 
-/// Plugins that are BSDFs in Mitsuba 3, 2 or 0.6.
+/// BSDF plugins of Mitsuba 3, 2 and 0.6.
 const KNOWN_BSDFS: [&str; 26] = [
     "diffuse",
     "roughdiffuse",
@@ -45,7 +45,7 @@ const KNOWN_BSDFS: [&str; 26] = [
     "measured",
 ];
 
-/// Context of a nested BSDF.
+/// Context inherited by a nested BSDF.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct BsdfContext {
     uv: UvConvention,
@@ -58,19 +58,19 @@ pub(super) struct BsdfContext {
     depth: u32,
 }
 
-/// A material that is being built.
+/// A material under construction.
 #[derive(Debug, Default)]
 pub(super) struct MaterialBuilder {
     /// The keys, including `type`.
     keys: TableEntries,
-    /// Whether the surface is an index-matched boundary that has no effect.
+    /// Whether the surface is an index-matched boundary, which has no effect.
     is_invisible: bool,
-    /// Whether the material transmits light as glass.
+    /// Whether the material is `glass`.
     is_glass: bool,
     is_blend: bool,
     /// Whether the back of the surface is black.
     is_one_sided: bool,
-    /// Whether the surface has a smooth conductor or a smooth dielectric coat.
+    /// Whether the surface is or contains a smooth conductor, dielectric or plastic.
     has_smooth_reflection: bool,
 }
 
@@ -170,7 +170,7 @@ impl<'a> SceneReader<'a> {
             return;
         }
         if builder.is_invisible {
-            // A surface that only emits.
+            // Use a black surface, which only emits.
             *builder = MaterialBuilder::one_sided("phong", vec![("diffuse", 0.0.into())]);
         }
         match self.color(emitter, "radiance", ColorRole::Emission, 1.0) {
@@ -228,7 +228,7 @@ impl<'a> SceneReader<'a> {
             "principledthin" => {
                 self.notes.substitute_light(
                     "`principledthin`",
-                    "rendered like `principled`",
+                    "rendered as `principled`",
                     object.span.clone(),
                 );
                 Some(self.principled(object, context))

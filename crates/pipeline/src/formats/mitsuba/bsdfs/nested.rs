@@ -13,7 +13,7 @@ use crate::math::DVec3;
 use crate::scene::BuiltValue;
 
 impl<'a> SceneReader<'a> {
-    /// Returns the single nested BSDF.
+    /// Returns the first nested BSDF, or reports an error.
     pub(super) fn nested_bsdf(&mut self, object: &'a PluginInstance) -> Option<&'a Child> {
         let nested = self.children_of_kind(object, ObjectKind::Bsdf).next();
         if nested.is_none() {
@@ -32,7 +32,7 @@ impl<'a> SceneReader<'a> {
         if let Some(second) = self.children_of_kind(object, ObjectKind::Bsdf).nth(1)
             && second.target != nested.target
         {
-            let text = "the first BSDF is on both sides";
+            let text = "the first BSDF is used on both sides";
             self.notes.substitute_light("`twosided` with two BSDFs", text, object.span.clone());
         }
         let context = BsdfContext { is_two_sided: true, ..context };
@@ -54,7 +54,7 @@ impl<'a> SceneReader<'a> {
         }
         let context = BsdfContext { mask: Some(index), ..context };
         let mut built = self.bsdf(nested.target, context)?;
-        // The materials of a blend have the opacity already.
+        // The materials of a blend already have the opacity.
         if !built.is_invisible && !built.is_blend {
             self.add_opacity(&mut built, context);
         }
@@ -69,7 +69,7 @@ impl<'a> SceneReader<'a> {
             self.notes.substitute_light("`mask` around solid glass", text, object.span.clone());
             return;
         }
-        let text = "they let light from point, spot and directional lights through, which Mitsuba blocks";
+        let text = "light from point, spot and directional lights passes through them; Mitsuba blocks it";
         self.notes.note("masks", text, object.span.clone());
         let opacity = self.number(object, "opacity", 0.5);
         let value = self.number_value(opacity, context);
@@ -152,20 +152,20 @@ impl<'a> SceneReader<'a> {
         let object = self.object(index);
         let nested = self.nested_bsdf(object)?;
         if context.coat.is_some() {
-            let text = "the inner coat is left out";
+            let text = "the inner coat is ignored";
             self.notes.substitute_light("a coat on another coat", text, object.span.clone());
             return self.bsdf(nested.target, context);
         }
         let context = BsdfContext { coat: Some(index), ..context };
         let mut built = self.bsdf(nested.target, context)?;
-        // The materials of a blend have the coat already.
+        // The materials of a blend already have the coat.
         if !built.is_invisible && !built.is_blend {
             self.add_coat(&mut built, context);
         }
         Some(built)
     }
 
-    /// Adds the keys of the `mask` and the `coating` that contain a part of a blend.
+    /// Adds the keys of the `mask` and the `coating` that contain one material of a blend.
     pub(super) fn add_enclosing_keys(&mut self, part: &mut MaterialBuilder, context: BsdfContext) {
         if part.is_blend {
             return;
@@ -182,11 +182,11 @@ impl<'a> SceneReader<'a> {
     fn add_coat(&mut self, built: &mut MaterialBuilder, context: BsdfContext) {
         let Some(object) = context.coat.map(|index| self.object(index)) else { return };
         if built.is_glass {
-            let text = "the coat is left out";
+            let text = "the coat is ignored";
             self.notes.substitute_light("a coat on glass", text, object.span.clone());
             return;
         }
-        let text = "the interreflections between the coat and the base differ";
+        let text = "interreflections between coat and base differ";
         self.notes.note(&format!("`{}`", object.plugin), text, object.span.clone());
         let ior = self.relative_ior(object, 1.5046).max(1.0);
         let thickness = self.float(object, "thickness").unwrap_or(1.0);
@@ -204,13 +204,13 @@ impl<'a> SceneReader<'a> {
         built.keys.push(("coat_ior", shorten_number(ior).into()));
         match self.color(object, "sigma_a", ColorRole::Unbounded, 0.0) {
             ColorSource::Constant(sigma) if sigma != DVec3::ZERO => {
-                // The light passes through the layer twice.
+                // Light passes through the layer twice.
                 let tint = sigma.to_array().map(|sigma| libm::exp(-2.0 * thickness * sigma).clamp(0.0, 1.0));
                 built.keys.push(("coat_tint", shorten_color(tint.into())));
             }
             ColorSource::Constant(_) => {}
             ColorSource::Texture(_) => {
-                self.notes.substitute_light("a texture of `sigma_a`", "replaced by 0", object.span.clone());
+                self.notes.substitute_light("a textured `sigma_a`", "replaced by 0", object.span.clone());
             }
         }
     }
@@ -233,7 +233,7 @@ impl<'a> SceneReader<'a> {
         let nested = self.nested_bsdf(object)?;
         let texture = self.nested_texture(object)?;
         let mut scale = self.float(object, "scale").unwrap_or(1.0);
-        // Version 0.6 scales the texture with a `scale` texture.
+        // Version 0.6 wraps the texture in a `scale` texture to scale it.
         let mut texture = texture;
         while self.object(texture).plugin == "scale" {
             let outer = self.object(texture);
@@ -243,7 +243,7 @@ impl<'a> SceneReader<'a> {
         }
         let mut built = self.bsdf(nested.target, context)?;
         if built.is_blend || built.is_invisible || built.has("bump") {
-            let text = "the bump map is left out";
+            let text = "the bump map is ignored";
             self.notes.substitute_light(
                 "`bumpmap` around a blend or another bump map",
                 text,
@@ -278,7 +278,7 @@ impl<'a> SceneReader<'a> {
         }
         let mut built = self.bsdf(nested.target, context)?;
         if built.is_blend || built.is_invisible || built.has("normal_map") {
-            let text = "the normal map is left out";
+            let text = "the normal map is ignored";
             self.notes.substitute_light(
                 "`normalmap` around a blend or another normal map",
                 text,
@@ -298,7 +298,7 @@ impl<'a> SceneReader<'a> {
     pub(super) fn note_constant_normal_map(&mut self, constant: &'a PluginInstance) {
         let value = constant.property("value").map(|property| &property.value);
         if value != Some(&PropertyValue::Vector(DVec3::new(0.5, 0.5, 1.0))) {
-            self.notes.substitute_light("a constant normal map", "left out", constant.span.clone());
+            self.notes.substitute_light("a constant normal map", "ignored", constant.span.clone());
         }
     }
 }

@@ -18,7 +18,7 @@ use crate::scene::BuiltValue;
 use crate::scene::nearest::nearest_name;
 
 impl<'a> SceneReader<'a> {
-    /// Returns a color scale that glimt lacks, unless it is 1.
+    /// Reports a color scale that glimt lacks, unless it is 1.
     pub(super) fn ignored_scale(&mut self, object: &'a PluginInstance, name: &str) {
         let scale = self.color(object, name, ColorRole::Reflectance, 1.0);
         if scale != ColorSource::Constant(DVec3::ONE) {
@@ -27,7 +27,7 @@ impl<'a> SceneReader<'a> {
         }
     }
 
-    /// Returns an index of refraction, which may be the name of a substance.
+    /// Returns an index of refraction, which may be given as the name of a substance.
     pub(super) fn ior(&mut self, object: &'a PluginInstance, name: &str, default: f64) -> f64 {
         let Some(property) = object.property(name) else { return default };
         let PropertyValue::Text(substance) = &property.value else {
@@ -54,7 +54,7 @@ impl<'a> SceneReader<'a> {
         })
     }
 
-    /// Index of refraction of the inside relative to the outside.
+    /// Interior index of refraction relative to the exterior.
     pub(super) fn relative_ior(&mut self, object: &'a PluginInstance, default: f64) -> f64 {
         let inside = self.ior(object, "int_ior", default);
         let outside = self.ior(object, "ext_ior", AIR);
@@ -130,8 +130,8 @@ impl<'a> SceneReader<'a> {
             }
             (NumberSource::Texture(_) | NumberSource::Constant(_), _) => {
                 let one = if matches!(across, NumberSource::Texture(_)) { across } else { along };
-                let text = "the roughness is isotropic";
-                self.notes.substitute_light("textures of `alpha_u` and `alpha_v`", text, object.span.clone());
+                let text = "one of them is used as isotropic roughness";
+                self.notes.substitute_light("textured `alpha_u` and `alpha_v`", text, object.span.clone());
                 let roughness = self.roughness_value(one, object, context);
                 keys.push(("roughness", roughness));
             }
@@ -146,7 +146,7 @@ impl<'a> SceneReader<'a> {
         context: BsdfContext,
     ) -> BuiltValue {
         match alpha {
-            // Mitsuba limits α to at least 1e-4.
+            // Mitsuba clamps α to at least 1e-4.
             NumberSource::Constant(alpha) => shorten_number(libm::sqrt(alpha.clamp(1e-4, 1.0))).into(),
             NumberSource::Texture(texture) => match self.roughness_texture(texture, context.uv) {
                 Some(value) => value,
@@ -223,7 +223,7 @@ impl<'a> SceneReader<'a> {
         Some(self.scaled_metal(metal, scale, object, context))
     }
 
-    /// Scales the reflectance of a metal: a blend with a black material, which is exact for a gray scale.
+    /// Scales the reflectance of a metal by blending it with black, which is exact for a gray scale.
     pub(super) fn scaled_metal(
         &mut self,
         mut metal: MaterialBuilder,
@@ -251,7 +251,7 @@ impl<'a> SceneReader<'a> {
                 Some(value) => {
                     let text = "replaced by its luminance";
                     self.notes.substitute_light(
-                        "a texture of `specular_reflectance`",
+                        "a textured `specular_reflectance`",
                         text,
                         span_of(object, "specular_reflectance"),
                     );
@@ -346,7 +346,7 @@ impl<'a> SceneReader<'a> {
         MaterialBuilder::one_sided("plastic", keys)
     }
 
-    /// Returns the coat's integrals, which are computed once per kind.
+    /// Returns the integrals of a coat, cached by its parameters.
     pub(super) fn plastic_coat(&mut self, ior: f64, alpha: Option<f64>, is_beckmann: bool) -> PlasticCoat {
         let key = (ior.to_bits(), alpha.map(f64::to_bits), is_beckmann);
         *self.plastic_coats.entry(key).or_insert_with(|| PlasticCoat::new(ior, alpha, is_beckmann))
@@ -358,7 +358,7 @@ impl<'a> SceneReader<'a> {
         let exponent = match self.number(object, "exponent", 30.0) {
             NumberSource::Constant(exponent) => exponent.clamp(0.0, 1e6),
             NumberSource::Texture(_) => {
-                self.notes.substitute_light("a texture of `exponent`", "replaced by 30", object.span.clone());
+                self.notes.substitute_light("a textured `exponent`", "replaced by 30", object.span.clone());
                 30.0
             }
         };
@@ -406,7 +406,7 @@ impl<'a> SceneReader<'a> {
             NumberSource::Constant(gloss) => gloss.clamp(0.0, 1.0),
             NumberSource::Texture(_) => 0.0,
         };
-        // Disney's coat interpolates α from 0.1 to 0.001.
+        // Disney's coat interpolates α from 0.1 to 0.001 with increasing gloss.
         let alpha = 0.1 + (0.001 - 0.1) * gloss;
         keys.push(("clearcoat_roughness", shorten_number(libm::sqrt(alpha)).into()));
         let ior = match (self.float(object, "eta"), self.float(object, "specular")) {
@@ -424,7 +424,7 @@ impl<'a> SceneReader<'a> {
             let is_zero = matches!(self.number(object, name, 0.0), NumberSource::Constant(0.0));
             if !is_zero {
                 let subject = format!("`{name}` of `{}`", object.plugin);
-                self.notes.substitute_light(&subject, "left out", span_of(object, name));
+                self.notes.substitute_light(&subject, "ignored", span_of(object, name));
             }
         }
         for name in [
@@ -440,9 +440,9 @@ impl<'a> SceneReader<'a> {
             let text = "rendered with glimt's coat, which is up to 14 % darker";
             self.notes.substitute_light("`clearcoat` of `principled`", text, object.span.clone());
         }
-        // Metals agree.
+        // Pure metals match Mitsuba's.
         if self.number(object, "metallic", 0.0) != NumberSource::Constant(1.0) {
-            let text = "about 2 % darker, because glimt's diffuse part is below a dielectric coat";
+            let text = "about 2 % darker, because glimt's diffuse lobe is under a dielectric coat";
             self.notes.note("`principled`", text, object.span.clone());
         }
         MaterialBuilder::one_sided("principled", keys)

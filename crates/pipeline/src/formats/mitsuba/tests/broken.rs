@@ -1,9 +1,9 @@
-//! Broken scenes: every error has the line and column of the mistake.
+//! Broken scenes: every error points to the line and column of the mistake.
 
 use super::{Bench, SENSOR};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 
-/// Line and column, both starting at 1, of a diagnostic.
+/// Line and column of a diagnostic, both starting at 1.
 fn place(diagnostic: &Diagnostic) -> (usize, usize) {
     let place = diagnostic.place.as_ref().unwrap_or_else(|| panic!("no place: {}", diagnostic.message));
     let before = &place.source[..place.span.start];
@@ -29,7 +29,7 @@ const MISTAKES: [(&str, &str); 44] = [
         r#"<shape type="sphere"><float name="radius" value="1"/><float name="radius" value="^2"/></shape>"#,
         "specified twice",
     ),
-    (r#"<shape type="sphere"><ref id="^wall"/></shape>"#, "nothing has the id `wall`"),
+    (r#"<shape type="sphere"><ref id="^wall"/></shape>"#, "no object has the id `wall`"),
     (r#"<bsdf type="diffuse" id="a"/><bsdf type="diffuse" id="^a"/>"#, "used twice"),
     (r#"<shape type="sphere"><bsdf type="^difuse"/></shape>"#, "unknown BSDF `difuse`"),
     (r#"<shape type="sphere"><bsdf type="^hair"/></shape>"#, "glimt does not render hair"),
@@ -162,7 +162,7 @@ fn hostile_files_are_rejected_quickly() {
     let doubling =
         format!("<default name=\"p0\" value=\"xxxxxxxx\"/>{doubling}<string name=\"a\" value=\"$p40\"/>");
     for (content, message) in
-        [(&nested, "nested more than"), (&long, "attribute longer than"), (&doubling, "too long")]
+        [(&nested, "nested more than"), (&long, "attribute is longer"), (&doubling, "too long")]
     {
         let started = std::time::Instant::now();
         let errors = super::scene(content).read().expect_err(message);

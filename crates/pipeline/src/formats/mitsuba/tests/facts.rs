@@ -1,4 +1,4 @@
-//! One test per fact about Mitsuba's format that a reader easily gets wrong.
+//! One test per fact about Mitsuba's format that is easy to get wrong.
 
 use super::{OBJ, PLY, close, has_line, lacks, material, numbers, png, scene};
 
@@ -110,14 +110,14 @@ fn field_of_view_is_along_x() {
         let fov = format!(r#"<float name="fov" value="90"/><string name="fov_axis" value="{axis}"/>"#);
         close(&[of(&fov)], &[90.0], 1e-9);
     }
-    // 50 mm on the diagonal of 36 × 24 mm.
+    // A focal length of 50 mm refers to the diagonal of 36 × 24 mm.
     let half_diagonal = (36_f64 * 36.0 + 24.0 * 24.0).sqrt() / 100.0;
     let half_height = half_diagonal / 5_f64.sqrt();
     close(&[of("")], &[2.0 * half_height.atan().to_degrees()], 1e-9);
 }
 
 #[test]
-fn default_film_is_gaussian() {
+fn film_defaults_match_mitsuba() {
     let text = camera(r#"<sensor type="perspective"/>"#);
     for line in ["width = 768", "height = 576", "filter = \"gaussian\"", "samples = 4"] {
         has_line(&text, line);
@@ -164,7 +164,7 @@ fn depth_limits_count_vertices() {
     );
 }
 
-/// The keys of the texture on a shape.
+/// The tables of a scene with one textured shape.
 fn texture_of(shape: &str, texture: &str) -> String {
     let bench = scene(&format!(
         "<shape {shape}<bsdf type=\"diffuse\"><texture name=\"reflectance\" {texture}</bsdf></shape>"
@@ -213,7 +213,7 @@ fn checkerboards_swap_colors_as_numbers() {
 }
 
 #[test]
-fn masks_take_the_luminance() {
+fn masks_do_not_read_alpha() {
     for (has_alpha, line) in
         [(true, "opacity = { texture = \"a\", channel = \"r\" }"), (false, "opacity = { texture = \"a\" }")]
     {
@@ -248,8 +248,8 @@ fn flat_emission_spectra_are_purple() {
 #[test]
 fn named_metals_are_integrated_like_emission() {
     let text = material(r#"<bsdf type="conductor"><string name="material" value="Au"/></bsdf>"#);
-    // Mitsuba 3.9 in RGB mode: eta = (0.1635, 0.3775, 1.2953), k = (3.8195, 2.3234, 1.7696) within the
-    // differences of the color matching functions.
+    // Mitsuba 3.9 in RGB mode: eta = (0.1635, 0.3775, 1.2953), k = (3.8195, 2.3234, 1.7696). glimt's values
+    // differ slightly, because its color matching functions do.
     let eta = numbers(&text, "eta");
     assert!(eta[0] < eta[1] && eta[1] < eta[2], "{eta:?}");
     has_line(&text, "roughness = 0");
@@ -309,7 +309,7 @@ fn gray_scales_of_metals_are_blends_with_black() {
 }
 
 #[test]
-fn coats_of_scaled_metals_are_on_both_parts() {
+fn coats_of_scaled_metals_cover_both_materials() {
     let text = material(
         r#"<bsdf type="coating"><float name="thickness" value="0.5"/><float name="sigma_a" value="2"/>
         <bsdf type="conductor"><string name="material" value="Au"/><float name="specular_reflectance" value="0.5"/></bsdf></bsdf>"#,
@@ -319,7 +319,7 @@ fn coats_of_scaled_metals_are_on_both_parts() {
 }
 
 #[test]
-fn meshes_without_area_are_left_out() {
+fn meshes_without_area_are_skipped() {
     let bench =
         scene(r#"<shape type="obj"><string name="filename" value="a.obj"/></shape><shape type="sphere"/>"#);
     bench.write("a.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n");
@@ -328,7 +328,7 @@ fn meshes_without_area_are_left_out() {
 }
 
 #[test]
-fn identity_normal_maps_are_left_out() {
+fn identity_normal_maps_are_ignored() {
     let text = material(
         r#"<bsdf type="normalmap"><texture name="normalmap" type="rawconstant"><vector name="value" value="0.5 0.5 1"/></texture>
         <bsdf type="diffuse"/></bsdf>"#,
@@ -354,7 +354,7 @@ fn plastic_is_linear_by_default() {
 }
 
 #[test]
-fn flat_meshes_are_not_smooth() {
+fn face_normals_disable_smoothing() {
     let of = |content: &str| {
         let bench =
             scene(&format!(r#"<shape type="ply"><string name="filename" value="a.ply"/>{content}</shape>"#));
@@ -377,13 +377,13 @@ fn environment_maps_start_at_minus_z() {
     let text = of("");
     has_line(&text, "rows = \"poles\"");
     has_line(&text, "matrix = [-1, 0, 0, 0, 1, 0, 0, 0, -1]");
-    // z up.
+    // Rotate the map to z up.
     let turned = of(r#"<transform name="to_world"><rotate x="1" angle="90"/></transform>"#);
     has_line(&turned, "matrix = [-1, 0, 0, 0, 0, 1, 0, 1, 0]");
 }
 
 #[test]
-fn skies_have_z_up_and_suns_in_the_world() {
+fn sun_directions_are_in_world_space() {
     let of = |version: &str| {
         let bench = super::Bench::new();
         let turn = r#"<transform name="to_world"><rotate x="1" angle="-90"/></transform>"#;
@@ -397,7 +397,7 @@ fn skies_have_z_up_and_suns_in_the_world() {
         );
         bench.toml()
     };
-    // In version 3, the turn moves the local up axis z to the world's y.
+    // In version 3, the rotation maps the local up axis z to the world's y axis.
     for version in ["3.0.0", "0.6.0"] {
         let text = of(version);
         assert!(text.contains("sky = { sun = [0.6, 0.8, 0]"), "{version}:\n{text}");
@@ -406,8 +406,8 @@ fn skies_have_z_up_and_suns_in_the_world() {
 }
 
 #[test]
-fn suns_follow_the_time() {
-    // The values of Mitsuba 3.9.1 for Tokyo, 10 July 2010, in its local axes (z up).
+fn sun_position_follows_the_time() {
+    // Mitsuba 3.9.1's values for Tokyo on July 10, 2010, in its local space (z up).
     for (hour, x, y, z) in [(9, 0.095_695_2, -0.614_786, 0.782_867), (15, 0.051_385_1, 0.691_748, 0.720_308)]
     {
         let text =
@@ -435,7 +435,7 @@ fn mirrored_rectangles_keep_their_front() {
         edge("u").cross(edge("v")).z
     };
     assert!(of("") > 0.0);
-    // The normal (0, 0, 1) is transformed, not the edges' cross product.
+    // Mitsuba transforms the normal (0, 0, 1) instead of the cross product of the edges.
     assert!(of(r#"<scale x="-1"/>"#) > 0.0);
     assert!(of(r#"<scale z="-1"/>"#) < 0.0);
 }

@@ -1,8 +1,8 @@
-//! Mutated scenes: no panics and no hangs.
+//! Mutated scenes must not cause panics or hangs.
 
 use super::{Bench, OBJ, SENSOR, scene_from_document};
 
-/// A scene with most elements.
+/// A scene that uses most elements.
 const SCENE: &str = r##"<default name="r" value="0.5"/><integrator type="path"><integer name="max_depth" value="5"/></integrator>
 <bsdf type="twosided" id="wall"><bsdf type="roughplastic"><rgb name="diffuse_reflectance" value="0.2, 0.3, 0.4"/>
 <float name="alpha" value="0.2"/></bsdf></bsdf><bsdf type="mask" id="leaf"><float name="opacity" value="0.5"/><ref id="wall"/></bsdf>
@@ -16,7 +16,7 @@ const SCENE: &str = r##"<default name="r" value="0.5"/><integrator type="path"><
 <emitter type="spot"><transform name="to_world"><lookat origin="0,0,1" target="0,0,0" up="0,1,0"/></transform></emitter>
 <emitter type="sunsky"><float name="turbidity" value="3"/></emitter>"##;
 
-/// Replacements for words.
+/// Replacements for attribute values.
 const WORDS: [&str; 18] = [
     "",
     "-1",
@@ -50,7 +50,7 @@ impl Random {
     }
 }
 
-/// Replaces an attribute, removes or repeats a part, or changes a byte.
+/// Replaces an attribute value, deletes or repeats a range of bytes, or changes a byte.
 fn mutate(text: &str, random: &mut Random) -> String {
     let boundary = |at: usize| (at..=text.len()).find(|at| text.is_char_boundary(*at)).unwrap_or(text.len());
     let (a, b) = (boundary(random.below(text.len())), boundary(random.below(text.len())));

@@ -1,4 +1,4 @@
-//! Tests of the Mitsuba reader: small scenes whose tables a wrong reader gets wrong.
+//! Tests of the Mitsuba reader: small scenes and the tables they are converted to.
 
 mod broken;
 mod facts;
@@ -19,10 +19,10 @@ use crate::scene::LoadedScene;
 use crate::scene::diagnostic::Diagnostic;
 use crate::stages::containers::GltfContainers;
 
-/// A sensor that scenes need.
+/// A minimal sensor. Every scene needs one.
 const SENSOR: &str = r#"<sensor type="perspective"/>"#;
 
-/// A folder with the files of a scene.
+/// A temporary folder with the files of a scene.
 struct Bench {
     folder: tempfile::TempDir,
     options: ForeignOptions,
@@ -65,7 +65,7 @@ impl Bench {
             .expect("valid")
     }
 
-    /// The scene's tables as TOML, without the first comment.
+    /// The scene's tables as TOML, without the leading comment.
     fn toml(&self) -> String {
         let text = self.read().expect("a valid scene").document.to_toml();
         text.split_once("\n\n").map_or(text.clone(), |(_, tables)| tables.to_owned())
@@ -91,28 +91,28 @@ fn diagnostics(error: ForeignError) -> Vec<Diagnostic> {
     }
 }
 
-/// A scene of version 3 with a sensor and other elements.
+/// A version 3 scene with a sensor and `content`.
 fn scene(content: &str) -> Bench {
     let bench = Bench::new();
     bench.write("scene.xml", format!("<scene version=\"3.0.0\">{SENSOR}{content}</scene>"));
     bench
 }
 
-/// The tables of a scene that contains a sphere with a BSDF.
+/// The tables of a scene with one sphere that has the BSDF `bsdf`.
 fn material(bsdf: &str) -> String {
     scene(&format!("<shape type=\"sphere\">{bsdf}</shape>")).toml()
 }
 
-/// Asserts that a text has a line.
+/// Asserts that `text` contains `line`.
 #[track_caller]
 fn has_line(text: &str, line: &str) {
     assert!(text.lines().any(|found| found == line), "no line `{line}` in:\n{text}");
 }
 
-/// Asserts that no line of a text starts with a word.
+/// Asserts that no line of `text` starts with `start`.
 #[track_caller]
 fn lacks(text: &str, start: &str) {
-    assert!(!text.lines().any(|found| found.starts_with(start)), "a line `{start}` in:\n{text}");
+    assert!(!text.lines().any(|found| found.starts_with(start)), "a line starts with `{start}` in:\n{text}");
 }
 
 /// Returns the numbers of the line `key = […]` or `key = …`.
@@ -124,7 +124,7 @@ fn numbers(text: &str, key: &str) -> Vec<f64> {
     words.map(|word| word.trim().parse().unwrap_or_else(|_| panic!("{line}"))).collect()
 }
 
-/// Asserts that numbers are close to each other.
+/// Asserts that all numbers are within `tolerance` of the wanted ones.
 #[track_caller]
 fn close(found: &[f64], wanted: &[f64], tolerance: f64) {
     let is_close = found.len() == wanted.len()
@@ -132,7 +132,7 @@ fn close(found: &[f64], wanted: &[f64], tolerance: f64) {
     assert!(is_close, "{found:?} is not {wanted:?}");
 }
 
-/// A PNG file of one white pixel: gray, or gray with alpha.
+/// A PNG file with one gray pixel, with or without an alpha channel.
 fn png(has_alpha: bool) -> Vec<u8> {
     let mut bytes = std::io::Cursor::new(Vec::new());
     let image = match has_alpha {
