@@ -1,16 +1,16 @@
-"""Reports how glimt reads the scenes of other renderers: one row per file of the given folders.
+"""Reports how well glimt reads scenes from other renderers, with one row per scene in the given folders.
 
     python3 benches/foreign/coverage.py [--glimt target/release/glimt] [-D NAME=VALUE] FOLDER...
 
-Each file is checked twice: with all substitutions allowed, and with --strict. The result is one of
+Each scene is checked twice, with and without --strict. The result is one of
 
-    opens          without any note
-    notes          opens with notes about definitions that differ
-    substitution   opens, but a feature without an equivalent is replaced
-    incomplete     an asset of the file is missing
-    refused        anything else
+    opens          without any warning
+    notes          opens, with notes about features that glimt defines differently
+    substitution   opens, but features without an equivalent are replaced
+    incomplete     an asset is missing
+    refused        any other error
 
-followed by the first reason. Files without a sensor are parts of scenes and are skipped, as are XML files that are not Mitsuba scenes.
+followed by the reasons. Files that are only parts of scenes are skipped, as are XML files that are not Mitsuba scenes.
 """
 
 import argparse
@@ -25,7 +25,8 @@ MISSING = re.compile(r"not found|Git LFS pointer|cannot read|no such file", re.I
 
 
 def is_whole_scene(path, seen=()):
-    """Whether a file, or a file that it includes, has a sensor or a camera."""
+    """Whether a file is a scene rather than a part of one: a pbrt file with `WorldBegin`, or a Mitsuba file that has a
+    sensor or includes a file that has one."""
     text = path.read_text(encoding="utf-8", errors="replace")
     if path.suffix == ".pbrt":
         return bool(re.search(r"^\s*WorldBegin", text, re.MULTILINE))
@@ -41,7 +42,7 @@ def is_whole_scene(path, seen=()):
 
 
 def check(glimt, path, options):
-    """Runs `glimt check` and returns its exit code and diagnostics."""
+    """Runs `glimt check`. Returns its exit code and diagnostics."""
     command = [glimt, "check", "--json", *options, str(path)]
     try:
         run = subprocess.run(command, capture_output=True, text=True, timeout=600)
@@ -55,7 +56,7 @@ def check(glimt, path, options):
 
 
 def classify(glimt, path, options):
-    """Returns the result for a file and its first reason."""
+    """Returns the result for a scene, and its reasons."""
     code, found = check(glimt, path, options)
     errors = [one["message"] for one in found if one["severity"] == "error"]
     if code != 0:
@@ -70,7 +71,7 @@ def classify(glimt, path, options):
 
 
 def main():
-    """Prints the table and the counts."""
+    """Prints the results, and their counts for each folder and in total."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
     parser.add_argument("--glimt", default="target/release/glimt")
     parser.add_argument("-D", action="append", default=[], metavar="NAME=VALUE")

@@ -1,8 +1,8 @@
-//! Notes and substitutions of scenes of other renderers.
+//! `glimt import` for scenes from other renderers: `--strict`, and the files that it copies.
 
 use super::test_dir::{TestDir, assert_mentions};
 
-/// A Mitsuba scene whose integrator contains `settings`.
+/// A Mitsuba scene with the given integrator, which contains the XML `settings`.
 fn mitsuba(integrator: &str, settings: &str) -> String {
     format!(
         r#"<scene version="3.0.0">

@@ -135,7 +135,7 @@ fn pbrt_errors_name_the_place() {
     assert_mentions(&stderr, &["part.pbrt:2:9", "did you mean `sphere`?"]);
     dir.write("part.pbrt", "Shape \"curve\"\nShape \"sphere\"\nLightSource \"infinite\"\n");
     let stderr = dir.expect(&format!("scene.pbrt {SMALL} -o a.exr"), 0);
-    assert_mentions(&stderr, &["the light differs", "`curve`", "part.pbrt:1:1"]);
+    assert_mentions(&stderr, &["the lighting changes", "`curve`", "part.pbrt:1:1"]);
     let stderr = dir.expect(&format!("scene.pbrt {SMALL} --strict -o a.exr"), 2);
     assert_mentions(&stderr, &["`curve`"]);
 }

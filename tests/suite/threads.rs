@@ -85,7 +85,7 @@ fn too_little_memory_is_one_message() {
     }
 }
 
-/// Checking subdivides meshes too, so it respects the memory limit.
+/// `glimt check` subdivides meshes, so it must respect the memory limit.
 #[test]
 #[cfg(target_os = "linux")]
 fn check_does_not_subdivide_beyond_the_memory_limit() {

@@ -121,7 +121,7 @@ pub enum Subcommand {
         /// Print errors and warnings as one JSON object on stdout
         #[arg(long)]
         json: bool,
-        /// Options for the scenes of other renderers.
+        /// Options for scenes from other renderers.
         #[command(flatten)]
         foreign: ForeignArgs,
         /// Colors: auto, truecolor, 256, 16, none
@@ -293,7 +293,7 @@ pub struct ImportArgs {
     /// The scene to write [default: FILE with .toml, in the current folder]
     #[arg(short, long, value_name = "SCENE")]
     pub output: Option<PathBuf>,
-    /// Options for the scenes of other renderers.
+    /// Options for scenes from other renderers.
     #[command(flatten)]
     pub foreign: ForeignArgs,
     /// Colors: auto, truecolor, 256, 16, none

@@ -50,7 +50,7 @@ pub fn check_scene(path: &Path, sets: &[String]) -> Result<SceneSummary, Failure
     check_scene_with_options(path, sets, &ForeignOptions::default(), &CancelToken::new())
 }
 
-/// Like [`check_scene`], with options for the scenes of other renderers.
+/// Like [`check_scene`], with options for scenes from other renderers.
 ///
 /// # Errors
 /// Returns all errors and warnings for the scene and its files.
@@ -70,7 +70,7 @@ pub struct IncrementalSceneChecker {
     contents: Arc<FileHashCache>,
     threads: RenderThreads,
     scenes: SceneCache,
-    /// Options for the scenes of other renderers.
+    /// Options for scenes from other renderers.
     foreign: ForeignOptions,
 }
 

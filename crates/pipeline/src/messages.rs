@@ -17,7 +17,7 @@ pub const CAMERA_CHANGED: &str =
     "the scene's camera has changed since it was moved: press c again to save it";
 /// The scene of another renderer is not written. Followed by the file's name.
 pub const FOREIGN_SCENE_NOT_WRITTEN: &str =
-    "glimt does not write scenes of other renderers; convert it first with `glimt import`:";
+    "glimt does not write scenes from other renderers; convert this one first with `glimt import`:";
 /// All faces of a model are fully transparent.
 pub const INVISIBLE_MODEL: &str = "the model is invisible: its faces have an opacity of 0";
 /// Effect of `clamp`.

@@ -44,7 +44,7 @@ macro_rules! overrides {
             pub layers: Vec<OutputLayer>,
             /// Turntable frame, or `None` for a still image.
             pub turn: Option<TurntableFrame>,
-            /// Options for the scenes of other renderers.
+            /// Options for scenes from other renderers.
             pub foreign: ForeignOptions,
             /// Pixels to render. The rest of the image stays black.
             pub crop: Option<Rect>,

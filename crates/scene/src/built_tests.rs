@@ -89,7 +89,7 @@ fn errors_underline_the_foreign_text() {
         (with_text.message.as_str(), place.label.as_str()),
         ("`radius` must be greater than 0", "found -2")
     );
-    // The underlined text may be something else than the value, such as the name of its object.
+    // The underlined text need not be the value. It may be the name of an object, for example.
     let mut named = built(2.0, SOURCE);
     named.start_table("camera");
     named.set_span_for_next_values(0..6);

@@ -98,7 +98,7 @@ impl SceneText {
         !self.is_foreign || *span != (0..0)
     }
 
-    /// Whether a value with this span is from a foreign file, so that the text there may not be the value.
+    /// Whether a span is in a foreign file, where the text need not match the value.
     pub(super) fn is_foreign_span(&self, span: &Range<usize>) -> bool {
         self.is_foreign && !self.is_span_in_set_arg(span)
     }

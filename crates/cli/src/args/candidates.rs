@@ -30,7 +30,7 @@ pub(crate) fn scene_completer() -> ArgValueCompleter {
     ArgValueCompleter::new(PathCompleter::file().filter(has_scene_extension))
 }
 
-/// Completes glimt scenes and scenes of other renderers.
+/// Completes glimt scenes and scenes from other renderers.
 pub(crate) fn any_scene_completer() -> ArgValueCompleter {
     let is_scene = |path: &std::path::Path| {
         has_scene_extension(path) || has_foreign_extension(path) && !has_model_extension(path)

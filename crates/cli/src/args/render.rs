@@ -34,7 +34,7 @@ pub struct RenderArgs {
     #[arg(long = "set", add = candidates::key_assignment_completer(), value_name = "TABLE.KEY=VALUE")]
     pub sets: Vec<String>,
 
-    /// Options for the scenes of other renderers.
+    /// Options for scenes from other renderers.
     #[command(flatten)]
     pub foreign: ForeignArgs,
 

@@ -70,9 +70,9 @@ impl<B: Bxdf> BxdfPacket<B> {
         self.shows_all &= other.shows_all;
     }
 
-    /// Sets the surfaces of some lanes to a material with these values. `colors` contains the values of the
-    /// material's texture, if it has one. Later entries of `shown` override earlier ones. Returns a mask of
-    /// surfaces that reflect nothing.
+    /// Sets the surfaces of some lanes to a material with these values. `colors` contains the colors looked
+    /// up in the material's texture, if it has one. Later entries of `shown` override earlier ones. Returns a
+    /// mask of surfaces that reflect nothing.
     #[inline(always)]
     pub fn evaluate_material_into_lanes(
         &mut self,

@@ -13,8 +13,7 @@ const MAX_FILL: f64 = 0.88;
 /// Minimum model size.
 const MIN_SIZE: f64 = 1e-30;
 
-/// Maximum number of turntable frames for which to measure the model. More would not change the result
-/// noticeably.
+/// Maximum number of turntable frames used to fit the model. More would not change the result noticeably.
 const MAX_MEASURED: u32 = 72;
 
 /// Position and orientation of a camera.

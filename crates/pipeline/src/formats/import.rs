@@ -22,7 +22,7 @@ pub enum ImportError {
     Work(String),
 }
 
-/// Imports a foreign file as a scene whose meshes and images are stored in `folder`.
+/// Imports a foreign file as a scene that stores its meshes and images in `folder`.
 ///
 /// # Errors
 /// Returns an error if the file is invalid, memory runs out, a thread cannot be started, or the token is

@@ -1,4 +1,4 @@
-//! Reads mesh files: OBJ, OFF, PLY and STL.
+//! Generates scenes for mesh files: OBJ, OFF, Mitsuba's serialized meshes, PLY and STL.
 
 use std::fs::File;
 use std::io::Read;
@@ -78,7 +78,7 @@ fn is_mesh_fully_transparent(loaded: &LoadedMesh) -> bool {
     !loaded.mesh.materials.is_empty() && loaded.mesh.materials.iter().all(is_fully_transparent)
 }
 
-/// Reads an OBJ or OFF file.
+/// Reads an OBJ, OFF or serialized file.
 pub(super) fn read_obj_or_off(
     path: &Path,
     context: &ForeignReadContext<'_>,
@@ -159,7 +159,7 @@ fn scene_of_mesh(
         document.set("vertex_colors", true);
     }
     add_ground(&mut document, &mut names, bounds, &eye);
-    // The generated material hides the fact that the file has no materials, so report it here.
+    // Because of the generated material, later stages cannot tell that the file has none, so report it here.
     let mut notes = if needs_material { first_warnings(&loaded.material_warnings) } else { Vec::new() };
     notes.extend(is_mesh_fully_transparent(&loaded).then(|| INVISIBLE_MODEL.to_owned()));
     let notes = notes.into_iter().map(|note| model_warning(path, note)).collect();
@@ -168,7 +168,7 @@ fn scene_of_mesh(
     Ok(ForeignScene { document, hash, companions, notes, substitutions: Vec::new() })
 }
 
-/// Returns the first warnings and, if there are more, a line that counts the rest.
+/// Returns the first warnings and, if there are more, a final line with the number of the others.
 fn first_warnings(warnings: &[String]) -> Vec<String> {
     let more = warnings.len().saturating_sub(MAX_WARNINGS);
     let rest = (more > 0).then(|| format!("and {more} {MORE_LIKE_THESE}"));

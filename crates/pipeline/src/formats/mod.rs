@@ -1,11 +1,11 @@
-//! Foreign formats: files that glimt renders or imports although they are not scene files.
+//! Foreign formats: files other than scene files that glimt can render or import.
 //!
-//! [`FORMATS`] lists the formats, each with its extensions and its importer. For a file on the command line,
-//! only this table decides which format it has. An importer reads the file into a [`ForeignScene`], whose
-//! document consists of the same tables and keys as a scene file. [`scene_from_document`] validates it like a
-//! scene file, and `glimt import` writes it as one; the rest of the pipeline does not know the format.
-//! `model` generates the view and the lights for models, which `glimt MODEL` and `glimt import` share so that
-//! they produce the same image.
+//! [`FORMATS`] lists the formats with their extensions and importers. It is the only place that determines
+//! the format of a file on the command line. An importer reads the file into a [`ForeignScene`], whose
+//! document consists of the same tables and keys as a scene file. [`scene_from_document`] validates the
+//! document like a scene file, and `glimt import` writes it as one; the rest of the pipeline is independent
+//! of the format. `model` generates the view and the lights for models. `glimt MODEL` and `glimt import`
+//! share it, so they produce the same image.
 
 pub(crate) mod foreign;
 mod frame;
@@ -71,27 +71,27 @@ const UNSUPPORTED_EXTENSIONS: [&str; 22] = [
 pub(crate) struct ForeignFormat {
     /// Extensions in lowercase, without dots.
     extensions: &'static [&'static str],
-    /// Whether the file is a model rather than a scene. Models have no text that the user could edit, and
-    /// glimt chooses a view and lights for them.
+    /// Whether the file is a model rather than a scene. Users do not edit models as text, and glimt chooses a
+    /// view and lights for them.
     pub(crate) is_model: bool,
     /// Reads a file.
     pub(crate) read: ReadFn,
-    /// Converts a file for `glimt import` to a scene whose meshes and images are stored in the named folder.
-    /// `None` if the format cannot be imported.
+    /// Converts a file to a scene for `glimt import`, with the meshes and images in the named folder. `None`
+    /// if the format cannot be imported.
     convert: Option<ConvertFn>,
 }
 
 type ReadFn = fn(&Path, &ForeignReadContext<'_>) -> Result<ForeignScene, ForeignError>;
 type ConvertFn = fn(&Path, &str, &ForeignReadContext<'_>) -> Result<ImportedScene, ForeignError>;
 
-/// Inputs of an importer other than the file.
+/// Everything an importer needs besides the file.
 #[derive(Clone, Copy)]
 pub(crate) struct ForeignReadContext<'a> {
     /// View of a model.
     pub(crate) view: ModelViewOptions,
-    /// Options for the scenes of other renderers.
+    /// Options for scenes from other renderers.
     pub(crate) options: &'a ForeignOptions,
-    /// Files that are open. Meshes stored here are not read again when the scene's assets are loaded.
+    /// Open files. Meshes stored here are not read again when the scene's assets are loaded.
     pub(crate) containers: &'a GltfContainers,
     pub(crate) token: &'a CancelToken,
 }
@@ -103,12 +103,11 @@ pub(crate) struct ForeignScene {
     pub(crate) document: SceneDocumentBuilder,
     /// Hash of the file.
     pub(crate) hash: FileHash,
-    /// Other files that affect the scene and are therefore watched. The assets that the scene references are
-    /// not included.
+    /// Other files to watch because they affect the scene, without the assets that the document references.
     pub(crate) companions: Vec<Companion>,
-    /// Other warnings about the file, such as missing materials.
+    /// Other warnings, such as missing materials or features that glimt defines differently.
     pub(crate) notes: Vec<Diagnostic>,
-    /// Features without an exact equivalent and their substitutes.
+    /// Features without an equivalent, and what replaces them.
     pub(crate) substitutions: Vec<Diagnostic>,
 }
 
@@ -119,9 +118,9 @@ pub struct ImportedScene {
     pub document: SceneDocumentBuilder,
     /// Files referenced by the scene, with paths relative to the scene file.
     pub files: Vec<(PathBuf, Vec<u8>)>,
-    /// Features without an exact equivalent and their substitutes.
+    /// Features without an equivalent, and what replaces them.
     pub substitutions: Vec<Diagnostic>,
-    /// Definitions that differ.
+    /// Warnings other than substitutions.
     pub notes: Vec<Diagnostic>,
 }
 
@@ -135,7 +134,7 @@ pub(crate) fn scene_from_document(
     sets: &[String],
 ) -> Result<LoadedScene, Vec<Diagnostic>> {
     load_built(document, path, sets).map_err(|mut errors| {
-        // Mark errors in generated values, which the user cannot see. Errors in overrides need no mark.
+        // The user cannot see generated values, so explain their origin. Errors in overrides need no prefix.
         for error in errors.iter_mut().filter(|error| error.path == path && error.place.is_none()) {
             let what = if has_model_extension(path) {
                 "generated for this model"
@@ -154,8 +153,8 @@ impl ForeignFormat {
         FORMATS.iter().find(|format| format.extensions.contains(&lowercase_extension(path).as_str()))
     }
 
-    /// Returns the format of a readable file, or `None` if the file must be read as a scene file. A scene file
-    /// may have any extension.
+    /// Returns the format of a readable file, or `None` if the file must be read as a scene file, which may
+    /// have any extension.
     pub(crate) fn from_file_unless_scene(path: &Path) -> Option<&'static Self> {
         Self::from_extension(path).filter(|_| lacks_camera_header(path))
     }

@@ -18,8 +18,7 @@ use crate::settings::{Overrides, UpAxis, ViewSide};
 /// View of a model, as specified on the command line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ModelViewOptions {
-    /// Side facing the camera. `None` uses the camera from the file, or [`ViewSide::Iso`] if the file has no
-    /// camera.
+    /// Side facing the camera. `None` uses the camera in the file, or [`ViewSide::Iso`] if there is none.
     pub(crate) from: Option<ViewSide>,
     /// Aspect ratio of the image, or `None` if the command line sets neither width nor height.
     pub(crate) aspect: Option<f64>,
@@ -111,7 +110,7 @@ impl Lighting {
         // At this irradiance, a white surface is as bright as under the default lights.
         const USUAL_IRRADIANCE: f64 = 3.0;
         let over = (irradiance / USUAL_IRRADIANCE).max(1.0);
-        // Keep the sky's radiance in the valid range even if a light is very close.
+        // A light very close to the model would otherwise push the sky's radiance out of the valid range.
         const MAX_STOPS: f64 = 40.0;
         Self::FromFile { exposure: -(libm::log2(over).min(MAX_STOPS) * 10.0).round() / 10.0 }
     }

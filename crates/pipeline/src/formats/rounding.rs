@@ -1,10 +1,10 @@
-//! Rounds the numbers of generated scenes, so that imported scene files are short.
+//! Rounds the numbers in generated scenes to keep imported scene files short.
 
 use crate::math::{DVec3, Vec2};
 use crate::scene::BuiltValue;
 
-/// Rounds to single precision, and returns the number with the fewest decimal digits that rounds to the same
-/// value. Does not round values of 10,000 and above.
+/// Returns the number with the fewest decimal digits that rounds to the same single-precision value. Numbers
+/// from 10,000 to 1e15 in magnitude are returned unchanged.
 pub(super) fn shorten(value: f64) -> f64 {
     if (1e4..1e15).contains(&value.abs()) {
         return value;

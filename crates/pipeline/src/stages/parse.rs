@@ -46,7 +46,7 @@ pub(crate) struct SceneParseRequest<'a> {
     pub(crate) sets: &'a [String],
     /// View of a model.
     pub(crate) show: ModelViewOptions,
-    /// Options for the scenes of other renderers.
+    /// Options for scenes from other renderers.
     pub(crate) foreign: &'a ForeignOptions,
 }
 

@@ -150,7 +150,8 @@ impl<'a> FileContext<'a> {
         self.source.full_text().get(span.clone()).unwrap_or_default()
     }
 
-    /// The text of a value, or `None` if the value is not in a text or may be written differently there.
+    /// Source text of a value. `None` if the value has no source text, or is from a foreign file, where the
+    /// text need not match the value.
     pub(super) fn value_text(&self, span: &Range<usize>) -> Option<&str> {
         Some(self.span_text(span)).filter(|text| !text.is_empty() && !self.source.is_foreign_span(span))
     }

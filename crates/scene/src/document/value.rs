@@ -5,8 +5,8 @@ use super::super::toml::format_value;
 pub(super) use super::super::toml::{TomlValue, Value};
 use super::context::FileContext;
 
-/// Describes a value for use in messages, as in `found the string "a"`. Quotes the text, or formats the value
-/// if it is not in a text or is from a foreign file.
+/// Describes a value for use in messages, as in `found the string "a"`. Quotes the source text, or formats
+/// the value if it has no source text or is from a foreign file.
 pub(super) fn describe_value(context: &FileContext<'_>, value: Value<'_>) -> String {
     const MAX_LENGTH: usize = 32;
     let written = || match context.value_text(&value.span()) {

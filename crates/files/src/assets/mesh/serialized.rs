@@ -1,5 +1,5 @@
-//! Mitsuba's serialized meshes: a header, then a zlib stream per mesh, then the offsets of the meshes. Supports
-//! versions 3, 4 and 5, whose offsets have 4 bytes in version 3 and 8 bytes from version 4.
+//! Mitsuba's serialized meshes. Each mesh consists of a header and a zlib stream, and a table at the end of
+//! the file contains their offsets: 4 bytes each in version 3, 8 bytes in versions 4 and 5.
 
 use std::io::Read;
 use std::path::Path;
@@ -13,9 +13,9 @@ use crate::assets::read::{self, Monitor};
 use crate::control::{CancelToken, Progress};
 use crate::math::{DVec3, Vec2, Vec3};
 
-/// First two bytes of each mesh.
+/// Magic number in the first two bytes of each mesh.
 const MAGIC: u16 = 0x041c;
-/// Size of the header before each zlib stream: the magic number and the version.
+/// Size of the header before each zlib stream, which consists of the magic number and the version.
 const HEADER_BYTES: usize = 4;
 /// Maximum number of vertices and of triangles in a mesh.
 const MAX_COUNT: u64 = 1 << 30;
@@ -24,26 +24,26 @@ const MAX_NAME_BYTES: usize = 1 << 16;
 /// Maximum number of bytes read at once.
 const CHUNK_BYTES: usize = 1 << 20;
 
-/// Flags of a mesh.
+/// Bits of a mesh's flags. Those without a suffix apply to versions 3 and 4, and normals also to version 5.
 const HAS_NORMALS: u32 = 0x1;
 const HAS_COORDINATES: u32 = 0x2;
 const HAS_COLORS: u32 = 0x8;
 const IS_DOUBLE: u32 = 0x2000;
-/// In version 5: texture coordinates.
+/// Version 5: the mesh has texture coordinates.
 const HAS_COORDINATES_5: u32 = 0x4;
-/// In version 5: the normals are part of encoded frames.
+/// Version 5: encoded tangent frames replace the normals.
 const HAS_TANGENTS_5: u32 = 0x2;
 
-/// Whether a path has the extension of serialized meshes.
+/// Whether a path has the extension `.serialized`.
 pub fn is_serialized(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("serialized"))
 }
 
-/// Reads one mesh of a file, or all of them as one mesh.
+/// Reads mesh `part` of a file, counted from 0, or all meshes merged into one if `part` is `None`.
 ///
 /// # Errors
 /// - [`AssetError::Unreadable`] if the file is not a regular file of at most 4 GiB.
-/// - [`AssetError::Malformed`] if the file is invalid, has no such mesh, or the mesh has no usable face.
+/// - [`AssetError::Malformed`] if the file is invalid, `part` is out of range, or the mesh has no usable face.
 /// - [`AssetError::Canceled`].
 pub fn load(
     path: &Path,
@@ -67,7 +67,7 @@ fn parse(source: &MeshFileBytes<'_>, part: Option<u32>) -> Result<ParsedMesh, As
         Some(part) => {
             let Some(&offset) = offsets.get(part as usize) else {
                 let count = offsets.len();
-                let reason = format!("part {part} is out of range: there are {count}, numbered from 0");
+                let reason = format!("part {part} is out of range: the file has {count}, numbered from 0");
                 return Err(source.malformed_error_without_line(reason));
             };
             add_mesh(source, offset, &mut parsed)?;
@@ -81,7 +81,7 @@ fn u16_at(bytes: &[u8], at: usize) -> Option<u16> {
     Some(u16::from_le_bytes(*bytes.get(at..)?.first_chunk()?))
 }
 
-/// Version of the mesh at an offset, or `None` if there is no mesh.
+/// Version of the mesh at an offset, or `None` if no mesh starts there.
 fn version_at(bytes: &[u8], at: usize) -> Option<u16> {
     if u16_at(bytes, at)? == MAGIC { u16_at(bytes, at + 2) } else { None }
 }
@@ -91,10 +91,10 @@ fn mesh_offsets(source: &MeshFileBytes<'_>) -> Result<Vec<usize>, AssetError> {
     let bytes = source.bytes;
     let malformed = |reason: &str| Err(source.malformed_error_without_line(reason));
     let Some(version) = version_at(bytes, 0) else {
-        return malformed("it is not a serialized mesh of Mitsuba");
+        return malformed("it is not a serialized Mitsuba mesh");
     };
     if !(3..=5).contains(&version) {
-        return malformed(&format!("version {version} is not supported; versions 3 to 5 are"));
+        return malformed(&format!("version {version} is not supported, only versions 3 to 5"));
     }
     let offset_bytes = if version == 3 { 4 } else { 8 };
     let table_end = bytes.len().saturating_sub(4);
@@ -106,7 +106,7 @@ fn mesh_offsets(source: &MeshFileBytes<'_>) -> Result<Vec<usize>, AssetError> {
     let Some(table) =
         table_start.and_then(|start| bytes.get(start..table_end)).filter(|table| !table.is_empty())
     else {
-        return malformed("the table of offsets at the end is invalid: the file is truncated");
+        return malformed("the offset table at the end of the file is invalid; the file may be truncated");
     };
     let read = |entry: &[u8]| entry.iter().rev().fold(0_u64, |sum, byte| sum << 8 | u64::from(*byte));
     let offsets: Vec<usize> = table
@@ -116,14 +116,14 @@ fn mesh_offsets(source: &MeshFileBytes<'_>) -> Result<Vec<usize>, AssetError> {
     Ok(offsets)
 }
 
-/// Reads values from a zlib stream.
+/// Reads the values of one mesh from its zlib stream.
 struct MeshStream<'a> {
     source: &'a MeshFileBytes<'a>,
     decoder: ZlibDecoder<&'a [u8]>,
 }
 
 impl MeshStream<'_> {
-    /// Reads bytes. Memory grows only with the data that is really there.
+    /// Reads `count` bytes. Allocates memory only as data arrives, because `count` may be corrupt.
     fn bytes(&mut self, count: usize) -> Result<Vec<u8>, AssetError> {
         let mut bytes = Vec::new();
         while bytes.len() < count {
@@ -155,7 +155,7 @@ impl MeshStream<'_> {
         Ok(u64::from_le_bytes(self.array()?))
     }
 
-    /// Reads a number of vertices or triangles.
+    /// Reads a count, such as the number of vertices. `what` names the counted elements in errors.
     fn count(&mut self, what: &str) -> Result<usize, AssetError> {
         let count = self.u64()?;
         if count > MAX_COUNT {
@@ -165,7 +165,7 @@ impl MeshStream<'_> {
         Ok(count as usize)
     }
 
-    /// Reads a name that ends with a zero byte.
+    /// Skips a null-terminated name.
     fn skip_terminated_name(&mut self) -> Result<(), AssetError> {
         for _ in 0..MAX_NAME_BYTES {
             if self.array::<1>()? == [0] {
@@ -175,7 +175,7 @@ impl MeshStream<'_> {
         Err(self.source.malformed_error_without_line("the name of a mesh is too long"))
     }
 
-    /// Reads numbers in single or double precision.
+    /// Reads `count` floating-point numbers in single or double precision.
     fn floats(&mut self, count: usize, is_double: bool) -> Result<Vec<f64>, AssetError> {
         let size = if is_double { 8 } else { 4 };
         let bytes = self.bytes(count * size)?;
@@ -198,7 +198,7 @@ impl MeshStream<'_> {
 /// Adds the mesh at an offset.
 fn add_mesh(source: &MeshFileBytes<'_>, offset: usize, parsed: &mut ParsedMesh) -> Result<(), AssetError> {
     let Some(version) = version_at(source.bytes, offset) else {
-        return Err(source.malformed_error_without_line("an offset does not lead to a mesh"));
+        return Err(source.malformed_error_without_line("an offset in the table does not point to a mesh"));
     };
     source.report_progress(offset)?;
     let compressed = source.bytes.get(offset + HEADER_BYTES..).unwrap_or_default();
@@ -223,7 +223,7 @@ fn add_mesh(source: &MeshFileBytes<'_>, offset: usize, parsed: &mut ParsedMesh) 
     Ok(())
 }
 
-/// Adds the vertices of versions 3 and 4. Returns the corners of the triangles.
+/// Adds the vertices of a mesh in version 3 or 4. Returns the vertex indices of its triangles.
 fn add_vertices(
     stream: &mut MeshStream<'_>,
     flags: u32,
@@ -246,7 +246,8 @@ fn add_vertices(
     stream.indices(3 * triangles)
 }
 
-/// Adds the vertices of version 5, which are records of eight numbers. Returns the corners of the triangles.
+/// Adds the vertices of a mesh in version 5, in which a vertex is a record of eight numbers. Returns the
+/// vertex indices of its triangles.
 fn add_vertices_of_version_5(
     stream: &mut MeshStream<'_>,
     flags: u32,
@@ -271,8 +272,8 @@ fn add_vertices_of_version_5(
     Ok(faces.chunks_exact(4).flat_map(|face| face[..3].iter().copied()).collect())
 }
 
-/// Appends vertices. Missing normals are zero, and missing texture coordinates (0, 0), if other meshes have
-/// them.
+/// Appends `count` vertices. If only some of the merged meshes have normals or texture coordinates, those of
+/// the other meshes are zero.
 fn add_records(parsed: &mut ParsedMesh, count: usize, positions: &[f64], normals: &[f64], uvs: &[f64]) {
     let before = parsed.positions.len();
     parsed.positions.extend(positions.chunks_exact(3).map(DVec3::from_slice));
@@ -299,7 +300,7 @@ mod tests {
     use crate::assets::rejection;
     use crate::control::ignore_progress;
 
-    /// A triangle whose first vertex is (x, 0, 0), in a version of the format.
+    /// Encodes a mesh of one triangle, whose first vertex is (x, 0, 0), in the given version of the format.
     fn triangle(version: u16, x: f32) -> Vec<u8> {
         let mut data: Vec<u8> = Vec::new();
         let floats = |data: &mut Vec<u8>, values: &[f32]| {
@@ -352,7 +353,7 @@ mod tests {
     }
 
     #[test]
-    fn parts_of_all_versions_are_found() {
+    fn all_versions_support_parts() {
         for version in [3, 4, 5] {
             let bytes = file(version, &[triangle(version, -1.0), triangle(version, -5.0)]);
             for (part, x, count) in [(Some(0), -1.0, 1), (Some(1), -5.0, 1), (None, -5.0, 2)] {

@@ -41,7 +41,7 @@ impl MapRows {
 pub struct EnvironmentMap {
     texels: Arc<Texels>,
     cells: PiecewiseConstant2D,
-    /// [`MapRows::scale_and_offset`].
+    /// Result of [`MapRows::scale_and_offset`] for this map.
     scale_and_offset: (f32, f32),
     /// Cosines of the polar angles at the tops of the rows of cells, followed by −1.
     heights: Vec<f64>,

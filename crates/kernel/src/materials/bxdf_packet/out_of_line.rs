@@ -1,5 +1,5 @@
-//! Wrappers around the large functions of [`BxdfPacket`]. Depending on [`Bxdf::IS_INLINED`], they inline the
-//! function or call the copy for the instruction set.
+//! Wrappers around the large functions of [`BxdfPacket`], which call an out-of-line copy of the function. If
+//! [`Bxdf::IS_INLINED`] is set, they inline the function instead.
 
 use super::BxdfPacket;
 use crate::materials::bsdf::{BsdfValues, DielectricSamplePacket, LobesToSample, ShownLobes};

@@ -1,13 +1,13 @@
-//! The color matching functions of the CIE 1931 standard observer (2 degrees) and the illuminant D65 (CIE 15).
+//! Tables of the CIE 1931 color matching functions (2-degree standard observer) and illuminant D65 (CIE 15).
 
 /// First wavelength of [`OBSERVER_AND_D65`] in nanometers.
 pub(super) const FIRST: f64 = 360.0;
 /// Last wavelength of [`OBSERVER_AND_D65`] in nanometers.
 pub(super) const LAST: f64 = 830.0;
-/// Distance between the rows of [`OBSERVER_AND_D65`] in nanometers.
+/// Wavelength step between rows of [`OBSERVER_AND_D65`] in nanometers.
 pub(super) const STEP: f64 = 5.0;
 
-/// Rows of x̄, ȳ, z̄ and the relative power of D65, every 5 nm from 360 to 830 nm.
+/// x̄, ȳ, z̄ and the relative spectral power of D65, every 5 nm from 360 to 830 nm.
 pub(super) const OBSERVER_AND_D65: [[f64; 4]; 95] = [
     [0.0001299, 3.917e-6, 0.0006061, 46.6383],
     [0.0002321, 6.965e-6, 0.001086, 49.3637],

@@ -1,4 +1,4 @@
-//! Steps of `glimt import` that scenes of all other renderers share.
+//! Steps of `glimt import` shared by all readers for scenes from other renderers.
 
 use std::path::{Path, PathBuf};
 
@@ -8,20 +8,20 @@ use crate::assets::AssetError;
 use crate::control::CancelToken;
 use crate::scene::BuiltValue;
 
-/// Keys and values of a table.
+/// The keys and values of a table.
 pub(crate) type TableEntries = Vec<(&'static str, BuiltValue)>;
 
-/// A file that an import copies.
+/// A file to copy during an import.
 #[derive(Clone, Debug)]
 pub(crate) struct CopiedFile {
-    /// Path relative to the new scene.
+    /// Path of the copy, relative to the new scene.
     pub(crate) name: String,
-    /// The file to copy.
+    /// Path of the original.
     pub(crate) source: PathBuf,
 }
 
-/// Rejects a scene that `glimt check` would reject. `scene` must refer to its files where they are now, because
-/// the copies do not exist yet.
+/// Rejects a scene that `glimt check` would reject. `scene` must reference the original files, because the
+/// copies do not exist yet.
 pub(crate) fn check_scene_before_import(scene: ForeignScene, path: &Path) -> Result<(), ForeignError> {
     let ForeignScene { document, companions, .. } = scene;
     scene_from_document(document, path, &[])
@@ -29,7 +29,7 @@ pub(crate) fn check_scene_before_import(scene: ForeignScene, path: &Path) -> Res
         .map_err(|diagnostics| ForeignError::Scene { diagnostics, companions })
 }
 
-/// Reads the files to copy. Returns their names and contents.
+/// Reads the files to copy, and returns the names and contents of the copies.
 pub(crate) fn read_copied_files(
     copies: Vec<CopiedFile>,
     token: &CancelToken,

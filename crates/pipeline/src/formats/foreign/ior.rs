@@ -1,6 +1,6 @@
-//! Named indices of refraction.
+//! Named dielectrics, and the Fresnel reflectance of dielectrics.
 
-/// Names and indices of refraction of dielectrics at 589 nm, as Mitsuba names them.
+/// Mitsuba's named dielectrics and their indices of refraction at 589 nm.
 const DIELECTRICS: [(&str, f64); 23] = [
     ("vacuum", 1.0),
     ("helium", 1.000_036),
@@ -27,7 +27,7 @@ const DIELECTRICS: [(&str, f64); 23] = [
     ("diamond", 2.419),
 ];
 
-/// Returns the index of refraction of a dielectric, ignoring case.
+/// Looks up the index of refraction of a named dielectric. Case does not matter.
 pub(crate) fn dielectric_ior(name: &str) -> Option<f64> {
     DIELECTRICS.iter().find(|(known, _)| known.eq_ignore_ascii_case(name)).map(|(_, ior)| *ior)
 }
@@ -38,7 +38,7 @@ pub(crate) fn dielectric_names() -> impl Iterator<Item = &'static str> {
 }
 
 /// Average of the Fresnel reflectance of a smooth dielectric over a cosine-weighted hemisphere, ∫ 2 F(μ) μ dμ.
-/// `eta` is the index of refraction on the other side relative to the side that the light comes from.
+/// `eta` is the index of refraction on the transmitted side, relative to the incident side.
 pub(crate) fn mean_fresnel_reflectance(eta: f64) -> f64 {
     const STEPS: u32 = 4096;
     let cosine = |index: u32| (f64::from(index) + 0.5) / f64::from(STEPS);
@@ -46,7 +46,8 @@ pub(crate) fn mean_fresnel_reflectance(eta: f64) -> f64 {
     sum / f64::from(STEPS)
 }
 
-/// Fresnel reflectance of a dielectric for unpolarized light at `cosine` ≥ 0 to the normal.
+/// Fresnel reflectance of a dielectric for unpolarized light. `cosine` ≥ 0 is the cosine of the angle of
+/// incidence.
 pub(crate) fn fresnel_reflectance(cosine: f64, eta: f64) -> f64 {
     let sine_squared = (1.0 - cosine * cosine) / (eta * eta);
     if sine_squared >= 1.0 {
@@ -65,7 +66,7 @@ mod tests {
     #[test]
     fn mean_fresnel_matches_known_values() {
         assert!((fresnel_reflectance(1.0, 1.5) - 0.04).abs() < 1e-12);
-        // d'Eon and Irving (2011): 0.0918 from outside; from inside 1 − (1 − outside)/η².
+        // d'Eon and Irving (2011): 0.0918 from outside, and 1 − (1 − outside)/η² from inside.
         let (outside, inside) = (mean_fresnel_reflectance(1.5), mean_fresnel_reflectance(1.0 / 1.5));
         assert!((outside - 0.0918).abs() < 2e-4, "{outside}");
         assert!((inside - (1.0 - (1.0 - outside) / 2.25)).abs() < 1e-4, "{inside}");

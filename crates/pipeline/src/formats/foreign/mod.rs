@@ -1,4 +1,4 @@
-//! Functions shared by the readers of other renderers' scenes.
+//! Code shared by the readers for scenes from other renderers.
 
 mod cie;
 pub(crate) mod import;

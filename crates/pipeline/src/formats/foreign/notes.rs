@@ -1,5 +1,5 @@
-//! Collects notes and substitutions: features of foreign scenes whose definition differs from glimt's, and
-//! features without an equivalent. Each kind is reported once, with its first place and its count.
+//! Collects notes (features that glimt defines differently) and substitutions (features without an
+//! equivalent). Each is reported once, at its first occurrence and with the number of occurrences.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -7,14 +7,14 @@ use std::ops::Range;
 use crate::scene::SourceFiles;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 
-/// How a feature differs in glimt.
+/// How the rendering of a feature differs from the original renderer's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(crate) enum NoteKind {
-    /// Replaces a feature that changes the light of the scene.
+    /// The feature has no equivalent, and its replacement changes the lighting of the scene.
     LightSubstitution,
-    /// Replaces another feature without an equivalent.
+    /// Any other replacement of a feature without an equivalent.
     Substitution,
-    /// The definition differs.
+    /// The feature exists in glimt, with a slightly different definition.
     Note,
 }
 
@@ -30,15 +30,15 @@ struct Note {
     kind: NoteKind,
     /// The feature, such as "`curve`".
     subject: String,
-    /// Its substitute or the difference.
+    /// What replaces the feature, or how it differs.
     text: String,
     span: Range<usize>,
     count: usize,
 }
 
 impl NoteCollector {
-    /// Adds a feature. `subject` names it, and `text` states its substitute or the difference. Features with
-    /// the same subject and text are counted.
+    /// Adds an occurrence of a feature. `subject` names the feature, and `text` states what replaces it or
+    /// how it differs. Occurrences with the same subject and text are merged and counted.
     pub(crate) fn add(&mut self, kind: NoteKind, subject: &str, text: &str, span: Range<usize>) {
         let key = (kind, format!("{subject}\n{text}"));
         match self.by_text.get(&key) {
@@ -51,7 +51,7 @@ impl NoteCollector {
         }
     }
 
-    /// Adds a note about a definition that differs.
+    /// Adds a note about a feature that glimt defines differently.
     pub(crate) fn note(&mut self, subject: &str, text: &str, span: Range<usize>) {
         self.add(NoteKind::Note, subject, text, span);
     }
@@ -61,19 +61,19 @@ impl NoteCollector {
         self.add(NoteKind::Substitution, subject, text, span);
     }
 
-    /// Adds a substitution that changes the light.
+    /// Adds a substitution that changes the lighting.
     pub(crate) fn substitute_light(&mut self, subject: &str, text: &str, span: Range<usize>) {
         self.add(NoteKind::LightSubstitution, subject, text, span);
     }
 
-    /// Returns the notes and the substitutions as warnings. Substitutions that change the light are first.
+    /// Returns the notes and the substitutions as warnings. Substitutions that change the lighting are first.
     pub(crate) fn into_diagnostics(mut self, sources: &SourceFiles) -> (Vec<Diagnostic>, Vec<Diagnostic>) {
         self.notes.sort_by_key(|note| note.kind);
         let (mut notes, mut substitutions) = (Vec::new(), Vec::new());
         for note in self.notes {
             let count = if note.count == 1 { String::new() } else { format!("{} × ", note.count) };
             let light = match note.kind {
-                NoteKind::LightSubstitution => "the light differs: ",
+                NoteKind::LightSubstitution => "the lighting changes: ",
                 NoteKind::Substitution | NoteKind::Note => "",
             };
             let message = format!("{light}{count}{}: {}", note.subject, note.text);
@@ -105,7 +105,7 @@ mod tests {
         let (notes, substitutions) = notes.into_diagnostics(&sources);
         assert_eq!(notes.iter().map(|one| &*one.message).collect::<Vec<_>>(), ["`bump`: fades"]);
         let messages: Vec<_> = substitutions.iter().map(|one| &*one.message).collect();
-        assert_eq!(messages, ["the light differs: `hair`: diffuse", "2 × `curve`: skipped"]);
+        assert_eq!(messages, ["the lighting changes: `hair`: diffuse", "2 × `curve`: skipped"]);
         assert_eq!(substitutions[0].path, Path::new("b.xml"));
         assert_eq!(substitutions[0].place.as_ref().map(|place| place.span.clone()), Some(6..10));
     }

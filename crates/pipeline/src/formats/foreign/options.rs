@@ -1,14 +1,14 @@
-//! Command-line options for the scenes of other renderers.
+//! Command-line options for scenes from other renderers.
 
 use crate::choice;
 use crate::scene::fingerprint::FingerprintHasher;
 
-/// Options for the scenes of other renderers. They have no effect on glimt's own scenes and on models.
+/// Options for scenes from other renderers. They have no effect on models or on glimt's own scenes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ForeignOptions {
-    /// Values of parameters such as `$spp`, in the order of the command line.
+    /// Names and values of parameters such as `$spp`, in command-line order.
     pub defines: Vec<(String, String)>,
-    /// Whether substitutions are errors.
+    /// Whether to treat substitutions as errors.
     pub is_strict: bool,
     /// How to treat missing meshes and images.
     pub missing: MissingAssetMode,
@@ -17,11 +17,11 @@ pub struct ForeignOptions {
 }
 
 choice! {
-    /// How to treat missing meshes and images of scenes of other renderers.
+    /// How to treat missing meshes and images in scenes from other renderers.
     pub enum MissingAssetMode {
-        /// They are errors.
+        /// Report an error.
         Error = "error",
-        /// Leave meshes out and replace images with gray.
+        /// Leave out missing meshes, and replace missing images with gray.
         Note = "note",
     }
 }

@@ -10,23 +10,23 @@ use crate::scene::{MAX_FILE_BYTES, SourceFiles};
 /// Maximum number of files in a scene.
 const MAX_FILES: usize = 10_000;
 
-/// The text files of a foreign scene, read so far.
+/// The text files of a foreign scene that have been read so far.
 #[derive(Debug, Default)]
 pub(crate) struct SourceReader {
     /// The texts of the files.
     pub(crate) files: SourceFiles,
     /// Hash of the first file.
     pub(crate) hash: FileHash,
-    /// All files but the first.
+    /// All files except the first, including missing ones.
     pub(crate) companions: Vec<Companion>,
     count: usize,
 }
 
 impl SourceReader {
-    /// Reads a file and returns its text and the offset of the text.
+    /// Reads a file. Returns its text, and the offset of the text in the concatenation of all files.
     ///
     /// # Errors
-    /// Returns an error if the file is not UTF-8 text or the texts become too large.
+    /// Returns an error if the file cannot be read or is not UTF-8, or if there are too many files or bytes.
     pub(crate) fn read(&mut self, path: &Path, token: &CancelToken) -> Result<(Arc<str>, usize), AssetError> {
         if self.count >= MAX_FILES {
             return Err(AssetError::malformed(
@@ -54,7 +54,7 @@ impl SourceReader {
         Ok((text, start))
     }
 
-    /// Watches a file that does not exist, so that the scene is read again once it does.
+    /// Watches a missing file, so that the scene is reloaded when the file appears.
     pub(crate) fn watch_missing(&mut self, path: PathBuf) {
         self.companions.push(Companion { path, hash: None, stamp: None });
     }

@@ -1,4 +1,4 @@
-//! Converts spectra to linear Rec. 709 colors with the color matching functions of CIE 1931.
+//! Converts spectra to linear Rec. 709 with the CIE 1931 color matching functions.
 
 use super::cie::{FIRST, LAST, OBSERVER_AND_D65, STEP};
 use crate::math::DVec3;
@@ -14,16 +14,16 @@ pub(crate) struct SampledSpectrum {
 }
 
 impl SampledSpectrum {
-    /// Creates a spectrum that is 0 outside of its range.
+    /// Creates a spectrum from pairs of a wavelength in nanometers and a value. It is 0 outside their range.
     ///
     /// # Errors
-    /// Returns the reason if there are no points, a number is not finite, or wavelengths do not increase.
+    /// Returns the reason if there are no points, a number is not finite, or the wavelengths do not increase.
     pub(crate) fn new(points: Vec<[f64; 2]>) -> Result<Self, String> {
         if points.is_empty() {
             return Err("the spectrum is empty".to_owned());
         }
         if points.iter().flatten().any(|number| !number.is_finite()) {
-            return Err("the spectrum has a number that is not finite".to_owned());
+            return Err("the spectrum contains a number that is not finite".to_owned());
         }
         if let Some(two) = points.windows(2).find(|two| two[1][0] <= two[0][0]) {
             return Err(format!("wavelengths must increase: {} follows {}", two[1][0], two[0][0]));
@@ -31,7 +31,7 @@ impl SampledSpectrum {
         Ok(Self { points })
     }
 
-    /// Parses the lines of an `.spd` file: a wavelength and a value each, and comments after `#`.
+    /// Parses an `.spd` file. Each line has a wavelength and a value; `#` starts a comment.
     ///
     /// # Errors
     /// Returns the 1-based line number and the reason.
@@ -66,7 +66,7 @@ impl SampledSpectrum {
     }
 }
 
-/// Returns x̄, ȳ, z̄ and the relative power of D65 at a wavelength in nanometers.
+/// Interpolates x̄, ȳ, z̄ and the relative power of D65 at a wavelength in nanometers.
 fn observer_and_d65(wavelength: f64) -> [f64; 4] {
     let position = (wavelength - FIRST) / STEP;
     let index = (position as usize).min(OBSERVER_AND_D65.len() - 2);
@@ -96,7 +96,8 @@ pub(crate) fn reflectance_to_xyz(spectrum: impl Fn(f64) -> f64) -> DVec3 {
     integrate(|wavelength, d65| spectrum(wavelength) * d65, white)
 }
 
-/// Integrates a function of the wavelength and the power of D65, divided by `norm`.
+/// Integrates a function of the wavelength and the power of D65 to CIE XYZ. A constant function with the
+/// value `norm` has luminance 1.
 fn integrate(value: impl Fn(f64, f64) -> f64, norm: f64) -> DVec3 {
     let steps = ((LAST - FIRST) / INTEGRATION_STEP) as usize;
     let (mut sum, mut luminance) = (DVec3::ZERO, 0.0);
@@ -110,7 +111,7 @@ fn integrate(value: impl Fn(f64, f64) -> f64, norm: f64) -> DVec3 {
 }
 
 /// Converts an emission spectrum to linear Rec. 709, with negative components set to 0. A spectrum that is 1
-/// everywhere has luminance 1, and its color is purple, because the white of Rec. 709 is D65.
+/// everywhere has luminance 1 and a purple tint, because the white point of Rec. 709 is D65.
 pub(crate) fn emission_color(spectrum: &SampledSpectrum) -> DVec3 {
     xyz_to_linear_rgb(spectrum_to_xyz(|wavelength| spectrum.at(wavelength))).max(DVec3::ZERO)
 }
@@ -120,13 +121,13 @@ pub(crate) fn reflectance_color(spectrum: &SampledSpectrum) -> DVec3 {
     unbounded_color(spectrum).clamp(DVec3::ZERO, DVec3::ONE)
 }
 
-/// Converts a spectrum such as η or k, weighted with D65, to linear Rec. 709, with negative components set
-/// to 0.
+/// Converts an unbounded spectrum such as η or k to linear Rec. 709, weighted with D65 and with negative
+/// components set to 0.
 pub(crate) fn unbounded_color(spectrum: &SampledSpectrum) -> DVec3 {
     xyz_to_linear_rgb(reflectance_to_xyz(|wavelength| spectrum.at(wavelength))).max(DVec3::ZERO)
 }
 
-/// Color of the emission spectrum that is 1 everywhere: about (1.205, 0.948, 0.909).
+/// Linear Rec. 709 color of an emission spectrum that is 1 everywhere: about (1.205, 0.948, 0.909).
 pub(crate) fn flat_emission_color() -> DVec3 {
     xyz_to_linear_rgb(DVec3::ONE)
 }
@@ -178,7 +179,7 @@ mod tests {
 
     #[test]
     fn blackbody_follows_wiens_law() {
-        // The maximum is at 2.897771955e-3 m·K / T.
+        // The radiance peaks at 2.897771955e-3 m·K / T.
         let peak = 2_897_771.955 / 5000.0;
         let at = |nm| blackbody_radiance(nm, 5000.0);
         assert!(at(peak) > at(peak - 1.0) && at(peak) > at(peak + 1.0));

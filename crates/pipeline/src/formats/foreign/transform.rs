@@ -1,10 +1,10 @@
-//! Transforms of foreign scenes, and their scene keys.
+//! Transforms in foreign scenes, and the scene keys for them.
 
 use crate::math::{DMat3, DMat4, DVec3};
 use crate::scene::BuiltValue;
 
-/// Rotation by `degrees` about an axis, with the formula cos θ·I + sin θ·\[a\]ₓ + (1 − cos θ)·a·aᵀ. The axis is
-/// used as it is: unless it has unit length, the result is not a rotation.
+/// Rotation by `degrees` about an axis: cos θ·I + sin θ·\[a\]ₓ + (1 − cos θ)·a·aᵀ. The axis is not
+/// normalized; unless it has unit length, the result is not a rotation.
 pub(crate) fn rotation_about_raw_axis(axis: DVec3, degrees: f64) -> DMat4 {
     let (sine, cosine) = sin_cos_degrees(degrees);
     let cross = DMat3::from_cols(
@@ -28,13 +28,13 @@ pub(crate) fn sin_cos_degrees(degrees: f64) -> (f64, f64) {
     }
 }
 
-/// The `matrix` key of a shape or instance: 16 numbers, row by row.
+/// Value of the `matrix` key of a shape or instance: 16 numbers in row-major order.
 pub(crate) fn matrix_value(matrix: &DMat4) -> BuiltValue {
     let rows = matrix.transpose().to_cols_array();
     rows.map(zero_if_negligible).into()
 }
 
-/// Returns 0 for numbers that are rounding errors relative to 1.
+/// Replaces numbers that are only rounding errors (relative to 1) with 0.
 fn zero_if_negligible(number: f64) -> f64 {
     if number.abs() < 1e-14 { 0.0 } else { number }
 }
@@ -54,7 +54,8 @@ pub(crate) fn is_invertible_affine(matrix: &DMat4) -> bool {
         && determinant.is_finite()
 }
 
-/// If a matrix is a rotation or reflection times a uniform scale, returns the scale factor, which is positive.
+/// Returns the positive scale factor of a matrix that combines a rotation or reflection with a uniform scale,
+/// or `None` for other matrices.
 pub(crate) fn similarity_scale(matrix: &DMat4) -> Option<f64> {
     let linear = linear_part(matrix);
     let product = linear.transpose() * linear;
@@ -63,13 +64,13 @@ pub(crate) fn similarity_scale(matrix: &DMat4) -> Option<f64> {
     (scale > 0.0 && error.iter().all(|entry| entry.abs() <= 1e-9 * scale)).then(|| scale.sqrt())
 }
 
-/// Whether a matrix mirrors.
+/// Whether a matrix reverses handedness.
 pub(crate) fn is_mirroring(matrix: &DMat4) -> bool {
     linear_part(matrix).determinant() < 0.0
 }
 
-/// The matrix of a camera at `origin` that looks at `target`: x points to the left of the image, y up, and z
-/// forward. Returns `None` if the directions are degenerate.
+/// Camera-to-world matrix of a camera at `origin` that looks at `target`. x points to the left of the image,
+/// y up and z forward. Returns `None` if `origin`, `target` and `up` do not define an orientation.
 pub(crate) fn look_at_left(origin: DVec3, target: DVec3, up: DVec3) -> Option<DMat4> {
     let forward = (target - origin).try_normalize()?;
     let left = up.cross(forward).try_normalize()?;

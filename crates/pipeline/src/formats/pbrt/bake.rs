@@ -1,5 +1,4 @@
-//! Computes images for textures that glimt cannot express: products, mixes, inverted images and functions of
-//! numbers.
+//! Bakes textures that glimt cannot express into images: products, mixes, inverted images and powers.
 
 use std::collections::HashMap;
 
@@ -20,18 +19,18 @@ use crate::math::color::luminance;
 use crate::math::{DVec2, DVec3, Vec3};
 use crate::system::file::FileStamp;
 
-/// Maximum number of texels of a computed image.
+/// Maximum number of texels in a baked image.
 const MAX_TEXELS: f64 = 8e6;
-/// Texels per cell of a checker.
+/// Texels per checker cell along each axis.
 const CELL_TEXELS: f64 = 64.0;
 
-/// Identity of a decoded image: file, whether it is linear, and whether it is a number.
+/// Identity of a decoded image: its file, `is_linear` and `is_number`.
 type ImageKey = (String, bool, bool);
 
-/// Images by identity.
+/// Decoded images by identity.
 type Images = HashMap<ImageKey, Pixels>;
 
-/// The part of the (u, v) plane that a computed image covers.
+/// The part of the (u, v) plane that a baked image covers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Domain {
     /// Maps (u, v) to the image.
@@ -42,12 +41,12 @@ struct Domain {
 }
 
 impl SceneWriter<'_> {
-    /// Returns a texture of the square root of α for pbrt's roughness.
+    /// Converts a texture of pbrt's roughness to glimt's, which is the square root of α.
     pub(super) fn roughness_node(&mut self, node: TextureNode, is_remapped: bool) -> TextureNode {
         TextureNode::Power(node.into(), if is_remapped { 0.25 } else { 0.5 })
     }
 
-    /// Returns the name of a texture of heights, and the height of its white.
+    /// Returns the name of a height texture, and the height of its white texels.
     pub(super) fn height_texture(&mut self, node: &TextureNode) -> (String, f64) {
         if let TextureNode::Image(image) = node
             && image.wrap != ImageWrap::Black
@@ -59,7 +58,7 @@ impl SceneWriter<'_> {
         (self.texture(node, PbrtTextureUse::Height), 1.0)
     }
 
-    /// Whether an image is gray without alpha, so that its first channel is the number that pbrt uses.
+    /// Whether an image is gray and opaque, so that its first channel is the number that pbrt uses.
     pub(super) fn is_gray_image(&mut self, image: &ImageNode) -> bool {
         let path = self.asset_path(&image.file.text);
         let stamp = FileStamp::from_path(&path);
@@ -79,7 +78,7 @@ impl SceneWriter<'_> {
         Ok(f64::from(luminance(texels.mean())).max(1e-12))
     }
 
-    /// Returns the keys of a computed image, and its name.
+    /// Bakes a texture. Returns the keys of its table and a name for it.
     pub(super) fn baked_keys(&mut self, node: &TextureNode, usage: PbrtTextureUse) -> (TableEntries, String) {
         let mut leaves = Vec::new();
         collect_leaves(node, &mut leaves);
@@ -95,7 +94,7 @@ impl SceneWriter<'_> {
         }
         let (domain, is_exact) = domain_of(&leaves, &images);
         if !is_exact {
-            let text = "the combination repeats after one unit";
+            let text = "their combination repeats after one unit of u and v";
             let span = first_file.map_or(0..0, |file| file.span.clone());
             self.notes.substitute("textures with different scales", text, span);
         }
@@ -161,7 +160,7 @@ fn image_key(image: &ImageNode) -> ImageKey {
     (image.file.text.clone(), image.is_linear, image.is_number)
 }
 
-/// Adds all parts of a texture that depend on (u, v).
+/// Collects the nodes that depend directly on (u, v).
 fn collect_leaves<'a>(node: &'a TextureNode, leaves: &mut Vec<&'a TextureNode>) {
     match node {
         TextureNode::Image(_) | TextureNode::Checker(..) | TextureNode::Bilinear(..) => leaves.push(node),
@@ -174,7 +173,7 @@ fn collect_leaves<'a>(node: &'a TextureNode, leaves: &mut Vec<&'a TextureNode>) 
     node.parts().iter().for_each(|part| collect_leaves(part, leaves));
 }
 
-/// The mapping of a leaf, its period in mapped units, and its resolution per mapped unit.
+/// Returns the mapping of a leaf, its period in mapped units, and its number of texels per mapped unit.
 fn leaf_grid(leaf: &TextureNode, images: &Images) -> (UvMapping, f64, DVec2) {
     match leaf {
         TextureNode::Image(image) => {
@@ -192,7 +191,7 @@ fn leaf_grid(leaf: &TextureNode, images: &Images) -> (UvMapping, f64, DVec2) {
     }
 }
 
-/// Returns the domain of a computed image, and whether its repetition is exact.
+/// Chooses the domain of a baked image. Also returns whether the image repeats exactly as the texture does.
 fn domain_of(leaves: &[&TextureNode], images: &Images) -> (Domain, bool) {
     let grids: Vec<_> = leaves.iter().map(|leaf| leaf_grid(leaf, images)).collect();
     let first = grids.first().map_or(UvMapping::IDENTITY, |grid| grid.0);
@@ -232,8 +231,8 @@ fn domain_of(leaves: &[&TextureNode], images: &Images) -> (Domain, bool) {
     (Domain { mapping, size: [size.x as usize, size.y as usize], wrap }, is_exact)
 }
 
-/// Evaluates a texture at all texel centers. Heights are shifted so that none is negative. After
-/// cancellation, the remaining rows are black.
+/// Evaluates a texture at all texel centers of a domain. Heights are shifted so that their minimum is 0.
+/// After cancellation, the remaining rows are black.
 fn bake(
     node: &TextureNode,
     images: &Images,
@@ -283,7 +282,7 @@ fn evaluate(node: &TextureNode, images: &Images, uv: DVec2) -> DVec3 {
         TextureNode::Power(part, exponent) => {
             DVec3::splat(libm::pow(of(part).x.max(0.0), *exponent).min(1.0))
         }
-        // Noise has no place in an image, so its mean is used.
+        // Noise depends on positions in space, not on (u, v), so use its mean.
         TextureNode::Noise { factor, .. } => DVec3::splat(0.5 * factor),
     }
 }
@@ -343,7 +342,7 @@ mod tests {
     }
 
     #[test]
-    fn functions_of_an_image_keep_its_mapping() {
+    fn powers_of_an_image_keep_its_mapping() {
         let node = TextureNode::Power(Arc::new(image(3.0)), 0.5);
         let (pixels, domain, is_exact) = baked(&node);
         assert_eq!((domain.mapping.scale, domain.size, is_exact), (DVec2::splat(3.0), [2, 2], true));
@@ -354,7 +353,7 @@ mod tests {
     }
 
     #[test]
-    fn products_of_whole_scales_repeat() {
+    fn products_with_integer_scales_repeat() {
         let node = TextureNode::Product(Arc::new([image(1.0), image(2.0)]));
         let (pixels, domain, is_exact) = baked(&node);
         assert_eq!((domain.mapping, domain.size, is_exact), (UvMapping::IDENTITY, [4, 4], true));

@@ -20,18 +20,18 @@ use crate::math::DVec3;
 use crate::scene::nearest::nearest_name;
 use crate::scene::sanitize::escape_and_truncate;
 
-/// How a spectrum is used, which determines its color.
+/// How a spectrum is used, which determines its conversion to a color.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum SpectrumUse {
     /// A reflectance or transmittance under D65, from 0 to 1.
     Reflectance,
-    /// An emission, divided by its luminance unless it is an `rgb` parameter.
+    /// An emission spectrum, which is divided by its luminance unless it is an `rgb` parameter.
     Emission,
-    /// An index of refraction or another value without a limit.
+    /// An unbounded quantity, such as an index of refraction.
     Unbounded,
 }
 
-/// Named glasses and their indices of refraction at 587.6 nm, from their manufacturers' catalogs.
+/// pbrt's named glasses and their indices of refraction at 587.6 nm, from the manufacturers' catalogs.
 const GLASSES: [(&str, f64); 7] = [
     ("glass-BK7", 1.5168),
     ("glass-BAF10", 1.67003),
@@ -42,7 +42,7 @@ const GLASSES: [(&str, f64); 7] = [
     ("glass-F11", 1.78472),
 ];
 
-/// Standard illuminants and their CIE 1931 chromaticities (CIE 15).
+/// pbrt's named illuminants and their CIE 1931 chromaticities (CIE 15).
 const ILLUMINANTS: [(&str, [f64; 2]); 16] = [
     ("stdillum-A", [0.44757, 0.40745]),
     ("stdillum-D50", [0.34567, 0.35850]),
@@ -62,15 +62,15 @@ const ILLUMINANTS: [(&str, [f64; 2]); 16] = [
     ("stdillum-F12", [0.43695, 0.40441]),
 ];
 
-/// Metals that pbrt names.
+/// pbrt's named conductors.
 const METALS: [&str; 7] = ["Ag", "Al", "Au", "Cu", "CuZn", "MgO", "TiO2"];
 
-/// Converts colors, reading spectrum files.
+/// Converts color parameters, including spectra in files.
 pub(super) struct ColorReader<'a> {
     /// Folder to which paths are relative.
     folder: PathBuf,
     token: &'a CancelToken,
-    /// The spectrum files, which are watched.
+    /// Spectrum files that have been read, to watch them.
     pub(super) companions: RefCell<Vec<Companion>>,
 }
 
@@ -91,7 +91,7 @@ impl<'a> ColorReader<'a> {
         self.color_of(found, space, usage).map(Some)
     }
 
-    /// Converts the values of a parameter.
+    /// Converts the values of a parameter to a color.
     pub(super) fn color_of(
         &self,
         found: &Parameter,
@@ -102,7 +102,7 @@ impl<'a> ColorReader<'a> {
         match found.kind {
             ParameterType::Rgb => {
                 let Ok(rgb) = <[f64; 3]>::try_from(found.numbers()?) else {
-                    return Err(PbrtError::new(span(), "an rgb value has three numbers"));
+                    return Err(PbrtError::new(span(), "an rgb value needs three numbers"));
                 };
                 if rgb.iter().any(|part| *part < 0.0) {
                     return Err(PbrtError::new(span(), "a color cannot be negative"));
@@ -122,7 +122,7 @@ impl<'a> ColorReader<'a> {
             ParameterType::Float => Ok(DVec3::splat(*found.single(found.numbers()?)?)),
             _ => {
                 let error = PbrtError::new(found.span.clone(), "this parameter must be a color");
-                Err(error.with_help("its type is rgb, spectrum, blackbody or texture"))
+                Err(error.with_help("its type must be rgb, spectrum, blackbody or texture"))
             }
         }
     }
@@ -135,7 +135,7 @@ impl<'a> ColorReader<'a> {
                 match sampled {
                     Ok(sampled) if rest.is_empty() => sampled,
                     Ok(_) => {
-                        let message = "a spectrum has pairs of a wavelength and a value";
+                        let message = "a spectrum needs pairs of a wavelength and a value";
                         return Err(PbrtError::new(found.values_span.clone(), message));
                     }
                     Err(reason) => return Err(PbrtError::new(found.values_span.clone(), reason)),
@@ -149,7 +149,10 @@ impl<'a> ColorReader<'a> {
                 self.spectrum_file(name)?
             }
             Values::Flags(_) => {
-                return Err(PbrtError::new(found.values_span.clone(), "a spectrum has numbers or a name"));
+                return Err(PbrtError::new(
+                    found.values_span.clone(),
+                    "a spectrum must be a name or a list of numbers",
+                ));
             }
         };
         Ok(match usage {
@@ -177,7 +180,7 @@ impl<'a> ColorReader<'a> {
         })
     }
 
-    /// Reads the index of refraction of a dielectric. Also returns whether it depends on the wavelength.
+    /// Reads the index of refraction of a dielectric. Also returns whether the dielectric is dispersive.
     pub(super) fn ior(
         &self,
         parameters: &Parameters,
@@ -199,16 +202,16 @@ impl<'a> ColorReader<'a> {
     }
 }
 
-/// The color of a spectrum divided by its luminance. Black for a spectrum without luminance.
+/// Returns the color of a spectrum, scaled to unit luminance, or black for a spectrum without luminance.
 fn color_of_unit_luminance(spectrum: impl Fn(f64) -> f64) -> DVec3 {
     let xyz = spectrum_to_xyz(spectrum);
     if xyz.y > 0.0 { xyz_to_linear_rgb(xyz / xyz.y).max(DVec3::ZERO) } else { DVec3::ZERO }
 }
 
-/// Converts a spectrum that pbrt knows by name.
+/// Returns the color of one of pbrt's named spectra.
 fn named_color(name: &str, usage: SpectrumUse) -> Option<DVec3> {
     if let Some((_, [x, y])) = ILLUMINANTS.iter().find(|(known, _)| *known == name) {
-        // D65 is the white of Rec. 709.
+        // D65 is the white point of Rec. 709.
         let is_white = name == "stdillum-D65" || usage != SpectrumUse::Emission;
         let xyz = DVec3::new(x / y, 1.0, (1.0 - x - y) / y);
         return Some(if is_white { DVec3::ONE } else { xyz_to_linear_rgb(xyz).max(DVec3::ZERO) });
@@ -263,14 +266,14 @@ mod tests {
     }
 
     #[test]
-    fn illuminant_a_equals_a_warm_blackbody() {
+    fn illuminant_a_matches_a_blackbody() {
         let a = color("\"spectrum L\" \"stdillum-A\"", SpectrumUse::Emission).expect("a color");
         let blackbody = color("\"blackbody L\" 2856", SpectrumUse::Emission).expect("a color");
         assert!((a - blackbody).abs().max_element() < 0.01, "{a} {blackbody}");
     }
 
     #[test]
-    fn metals_have_names() {
+    fn conductors_are_found_by_name() {
         let eta = color("\"spectrum L\" \"metal-Cu-eta\"", SpectrumUse::Unbounded).expect("a color");
         assert!(eta.x < 0.4 && eta.z > 1.0, "{eta}");
         let error = color("\"spectrum L\" \"metal-Cu-etta\"", SpectrumUse::Unbounded).expect_err("an error");

@@ -1,4 +1,4 @@
-//! Emission and opacity of shapes.
+//! Emission, opacity and interior media of shapes.
 
 use super::colors::SpectrumUse;
 use super::lexer::{PbrtError, PbrtResult};
@@ -16,15 +16,15 @@ use crate::scene::sanitize::escape_and_truncate;
 /// The light of an `AreaLightSource`.
 struct AreaLight {
     emission: Emission,
-    /// Power of every shape, if it determines the radiance.
+    /// Power of each shape, from which the radiance is derived if it is set.
     power: Option<f64>,
-    /// Luminance of the image, for `power`.
+    /// Mean luminance of the image if there is a `power`, otherwise 1.
     mean: f64,
 }
 
 impl SceneWriter<'_> {
-    /// Reads the properties that glimt's materials have instead of shapes. Returns `None` if the shape is not
-    /// visible and does not emit light.
+    /// Reads the properties that belong to shapes in pbrt, and to materials in glimt. Returns `None` if the
+    /// shape is invisible and does not emit light.
     pub(super) fn shape_properties(
         &mut self,
         shape: &ShapeEntity,
@@ -52,14 +52,14 @@ impl SceneWriter<'_> {
             (true, None) => Ok(None),
             (true, emission) => {
                 let text = "it is visible";
-                self.notes.substitute_light("a light that `alpha` hides", text, entity.span());
+                self.notes.substitute_light("a light hidden by `alpha`", text, entity.span());
                 Ok(Some(ShapeProperties { emission, alpha: None, tint }))
             }
             (false, emission) => Ok(Some(ShapeProperties { emission, alpha, tint })),
         }
     }
 
-    /// Returns the light that a shape emits.
+    /// Returns the emission of a shape, or `None` if it is black.
     fn read_area_light(
         &mut self,
         light: &Entity,
@@ -69,7 +69,7 @@ impl SceneWriter<'_> {
     ) -> PbrtResult<Option<Emission>> {
         if light.kind.text != "diffuse" {
             let error = PbrtError::new(light.kind.span.clone(), "unknown area light");
-            return Err(error.with_label("the only one is \"diffuse\""));
+            return Err(error.with_label("only \"diffuse\" is supported"));
         }
         let AreaLight { mut emission, power, mean } = self.read_area_light_parameters(light)?;
         if let Some(power) = power {
@@ -119,7 +119,8 @@ impl SceneWriter<'_> {
         Ok(AreaLight { emission: Emission { color, image, is_two_sided }, power, mean })
     }
 
-    /// Returns the area of a shape for `power`, which pbrt gives to every triangle of a mesh.
+    /// Returns the area that emits `power`. In pbrt, each triangle of a mesh is a light with this power, so
+    /// the area is the mean area of the triangles.
     fn area_for_power(&mut self, shape: &Entity, data: Option<&MeshData>, matrix: &DMat4) -> PbrtResult<f64> {
         let (parameters, span) = (&shape.parameters, shape.span());
         let loaded;
@@ -144,8 +145,8 @@ impl SceneWriter<'_> {
         positive_area(mean, parameters)
     }
 
-    /// Returns the transmittance per unit of length of the medium inside of a shape, if the medium only
-    /// absorbs light. Substitutes other media.
+    /// Returns the transmittance per unit length of the medium inside a shape, if the medium only absorbs
+    /// light. Adds substitutions for other media.
     fn read_inside_medium(&mut self, shape: &ShapeEntity) -> PbrtResult<Option<DVec3>> {
         let [inside, outside] = &shape.media;
         let span = shape.placed.entity.span();
@@ -168,14 +169,14 @@ impl SceneWriter<'_> {
                 None => {
                     let kind = medium.parameters.string("type")?.map_or("", |kind| &kind.text);
                     let subject = format!("medium `{kind}`");
-                    self.notes.substitute_light(&subject, "light passes it unchanged", medium.span());
+                    self.notes.substitute_light(&subject, "light passes through it unchanged", medium.span());
                 }
             }
         }
         Ok(tint)
     }
 
-    /// Returns the absorption of a medium that does not scatter or emit light.
+    /// Returns the absorption coefficient of a medium, or `None` if the medium scatters or emits light.
     fn pure_absorption(&self, medium: &Entity) -> PbrtResult<Option<DVec3>> {
         let parameters = &medium.parameters;
         let kind = parameters.string("type")?.map_or("", |kind| &kind.text);

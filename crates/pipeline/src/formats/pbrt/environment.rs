@@ -1,4 +1,4 @@
-//! Converts pbrt's infinite lights to an environment map.
+//! Combines pbrt's infinite lights into one environment map.
 
 use std::f64::consts::{FRAC_2_PI, PI, TAU};
 use std::ops::Range;
@@ -22,16 +22,16 @@ use crate::system::file::FileStamp;
 const SUBSAMPLES: usize = 2;
 /// Samples per texel along each axis where the radiance varies by more than [`CONTRAST`].
 const FINE_SUBSAMPLES: usize = 8;
-/// Ratio of the largest to the smallest sample of a texel and its neighbors above which more samples are taken, so that small
-/// bright sources keep their power.
+/// Ratio of the largest to the smallest sample in a texel and its neighbors above which the texel gets
+/// [`FINE_SUBSAMPLES`], so that small bright sources keep their power.
 const CONTRAST: f32 = 3.0;
-/// Largest and smallest number of rows of an environment map.
+/// Smallest and largest number of rows of an environment map.
 const ROWS: [usize; 2] = [64, 2048];
 
-/// The light from all around.
+/// The infinite lights of a scene.
 #[derive(Default)]
 pub(super) struct InfiniteLights {
-    /// Sum of all constant lights.
+    /// Sum of all constant infinite lights.
     pub(super) color: DVec3,
     pub(super) images: Vec<InfiniteImage>,
 }
@@ -40,25 +40,25 @@ pub(super) struct InfiniteLights {
 pub(super) struct InfiniteImage {
     pub(super) file: Text,
     pub(super) scale: f64,
-    /// Illuminance of the upper hemisphere, if it determines the scale.
+    /// Illuminance from the upper hemisphere to which the image is normalized, before `scale` is applied.
     pub(super) illuminance: Option<f64>,
-    /// Transform from the light's coordinates to the world.
+    /// Light-to-world transform.
     pub(super) matrix: DMat4,
     pub(super) span: Range<usize>,
 }
 
-/// A decoded map.
+/// A decoded image of an infinite light.
 struct Map {
     pixels: Pixels,
     scale: f64,
-    /// Transform from the world to the light's coordinates.
+    /// World-to-light transform.
     to_light: DMat4,
     /// Hash of the file.
     hash: FileHash,
 }
 
 impl SceneWriter<'_> {
-    /// Writes `[environment]`.
+    /// Writes the `[environment]` table.
     pub(super) fn write_environment(&mut self, lights: &InfiniteLights) -> PbrtResult<()> {
         if lights.images.is_empty() {
             if lights.color != DVec3::ZERO {
@@ -71,7 +71,7 @@ impl SceneWriter<'_> {
         for image in &lights.images {
             maps.push(self.load_map(image)?);
         }
-        // Everything that determines the map.
+        // Cache the result by everything it depends on.
         let mut key = format!("{:?}", lights.color);
         for (image, map) in lights.images.iter().zip(&maps) {
             key.push_str(&format!("{:?} {:?} {:?}", map.hash, map.scale, image.matrix));
@@ -99,8 +99,8 @@ impl SceneWriter<'_> {
         let (width, height) = (decoded.texels.width as usize, decoded.texels.height as usize);
         let pixels = Pixels { width, height, values: decoded.texels.into_linear_colors() };
         if width != height {
-            let text = "it is read as an equirectangular map, as in pbrt-v3";
-            self.notes.note("a map of an infinite light that is not square", text, image.span.clone());
+            let text = "it is treated as an equirectangular map, as in pbrt-v3";
+            self.notes.note("a non-square image of an infinite light", text, image.span.clone());
         }
         let scale = match image.illuminance {
             Some(goal) => image.scale * goal / upper_illuminance(&pixels).max(1e-12),
@@ -110,7 +110,7 @@ impl SceneWriter<'_> {
     }
 }
 
-/// The illuminance that pbrt computes for a map.
+/// Illuminance from the upper hemisphere, as pbrt computes it: with a weight of 2π/n for each of n texels.
 fn upper_illuminance(pixels: &Pixels) -> f64 {
     let of_texel = |index: usize| {
         let (column, row) = (index % pixels.width, index / pixels.width);
@@ -123,7 +123,7 @@ fn upper_illuminance(pixels: &Pixels) -> f64 {
 }
 
 impl Map {
-    /// Radiance from a direction in the world.
+    /// Radiance from a direction in world coordinates.
     fn radiance(&self, direction: DVec3) -> DVec3 {
         let local = self.to_light.transform_vector3(direction).normalize_or_zero();
         let (width, height) = (self.pixels.width, self.pixels.height);
@@ -139,16 +139,16 @@ impl Map {
     }
 }
 
-/// The samples of a texel.
+/// Statistics of the samples in a texel.
 #[derive(Clone, Copy)]
 struct TexelSamples {
     mean: Vec3,
-    /// Smallest and largest component.
+    /// Smallest and largest sample, measured by the largest color component.
     least: f32,
     most: f32,
 }
 
-/// Takes `count`² samples of the texel at a column and a row.
+/// Takes `count`² samples in a texel of the environment map.
 fn sample_texel(maps: &[Map], rows: usize, column: usize, row: usize, count: usize) -> TexelSamples {
     let (mut sum, mut least, mut most) = (DVec3::ZERO, f64::INFINITY, 0.0_f64);
     for index in 0..count * count {
@@ -164,8 +164,8 @@ fn sample_texel(maps: &[Map], rows: usize, column: usize, row: usize, count: usi
     TexelSamples { mean, least: least as f32, most: most as f32 }
 }
 
-/// Adds all maps and a constant to an equirectangular map. Where neighboring texels differ much, takes more
-/// samples.
+/// Resamples the sum of all maps and a constant as an equirectangular map. Takes more samples where
+/// neighboring texels differ strongly.
 fn resample(maps: &[Map], color: DVec3, rows: usize) -> Pixels {
     let columns = 2 * rows;
     let coarse: Vec<TexelSamples> = (0..rows * columns)
@@ -195,7 +195,7 @@ fn resample(maps: &[Map], color: DVec3, rows: usize) -> Pixels {
     Pixels { width: columns, height: rows, values }
 }
 
-/// The direction of a point in glimt's environment maps. v = 0 is at +y, and the center is at −z.
+/// Direction of a point in glimt's environment maps. v = 0 is +y, and the center is −z.
 fn environment_direction(u: f64, v: f64) -> DVec3 {
     let (sine, cosine) = libm::sincos(PI * v);
     let (across, along) = libm::sincos(TAU * (u - 0.5));
@@ -203,7 +203,7 @@ fn environment_direction(u: f64, v: f64) -> DVec3 {
 }
 
 /// Maps a unit vector to the square of an equal-area octahedral map (Clarberg, *Fast Equal-Area Mapping of the
-/// (Hemi)Sphere using SIMD*, 2008). (0, 0) is the top left corner, and +z is in the center.
+/// (Hemi)Sphere using SIMD*, 2008). (0, 0) is the top left corner, and the center is +z.
 fn square_of_direction(direction: DVec3) -> DVec2 {
     let [x, y, z] = direction.abs().to_array();
     let radius = (1.0 - z).max(0.0).sqrt();
@@ -244,8 +244,8 @@ mod tests {
     }
 
     #[test]
-    fn square_mapping_keeps_areas() {
-        // Each of the 8 octants covers the same number of texels, and the mean of z² is 1/3.
+    fn square_mapping_preserves_areas() {
+        // Over uniformly distributed directions, z² and x² have a mean of 1/3.
         let count = 256;
         let directions: Vec<DVec3> = (0..count * count)
             .map(|index| {
@@ -287,7 +287,7 @@ mod tests {
 
     #[test]
     fn resampled_map_has_the_radiance_of_its_light() {
-        // Red for +z of the light, whose z axis is the world's y axis.
+        // The light is red around its +z axis, which is the world's +y axis.
         let values = (0..64 * 64)
             .map(|index| DVec2::new(f64::from(index % 64) + 0.5, f64::from(index / 64) + 0.5) / 64.0)
             .map(|at| if direction_of_square(at).z > 0.0 { Vec3::X } else { Vec3::Z })

@@ -3,13 +3,13 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
-/// An error at a place in the text.
+/// An error at a position in the text.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct PbrtError {
     pub(super) message: String,
-    /// Place in the texts of all files.
+    /// Span in the concatenated text of all files.
     pub(super) span: Range<usize>,
-    /// Words below the underlined text.
+    /// Label of the underlined text.
     pub(super) label: String,
     pub(super) help: Option<String>,
 }
@@ -29,7 +29,7 @@ impl PbrtError {
         self
     }
 
-    /// Adds the suggestion of a similar name, if there is one.
+    /// Suggests a similar name, if there is one.
     pub(super) fn with_suggestion(self: Box<Self>, near: Option<&str>) -> Box<Self> {
         match near {
             Some(near) => self.with_label(format!("did you mean `{near}`?")),
@@ -55,20 +55,20 @@ pub(super) enum TokenKind {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Token<'a> {
     pub(super) kind: TokenKind,
-    /// The text, without quotes and escapes.
+    /// The text, without quotes and with escape sequences replaced.
     pub(super) text: Cow<'a, str>,
-    /// Place in the texts of all files.
+    /// Span in the concatenated text of all files.
     pub(super) span: Range<usize>,
 }
 
 /// Maximum length of a quoted string.
 const MAX_STRING_BYTES: usize = 1 << 16;
 
-/// The tokens of a file.
+/// Lexer for the text of one file.
 pub(super) struct Lexer<'a> {
     text: &'a str,
     at: usize,
-    /// Offset of the text in the texts of all files.
+    /// Offset of `text` in the concatenated text of all files.
     base: usize,
 }
 
@@ -78,7 +78,7 @@ impl<'a> Lexer<'a> {
         Self { text, at, base }
     }
 
-    /// The place at the end of the text.
+    /// An empty span at the end of the text.
     pub(super) fn end(&self) -> Range<usize> {
         let end = self.base + self.text.trim_end().len();
         end..end
@@ -163,7 +163,7 @@ impl<'a> Lexer<'a> {
         Ok(Token { kind: TokenKind::Quoted, text, span })
     }
 
-    /// Replaces escape sequences. `start` is the place of `raw` in the text.
+    /// Replaces escape sequences. `start` is the offset of `raw` in the text.
     fn unescape(&self, raw: &str, start: usize) -> PbrtResult<String> {
         let mut text = String::with_capacity(raw.len());
         let mut chars = raw.char_indices();
@@ -182,7 +182,7 @@ impl<'a> Lexer<'a> {
                 _ => {
                     let span = self.span(start + at..start + at + 1);
                     return Err(PbrtError::new(span, "unknown escape sequence").with_help(
-                        "a backslash must precede one of \" \\ ' n r t b f; paths are separated by /",
+                        "a backslash must be followed by one of \" \\ ' n r t b f; use / in paths",
                     ));
                 }
             });
@@ -206,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn tokens_need_no_blanks_between_them() {
+    fn tokens_need_no_separating_whitespace() {
         let text = "Shape\"sphere\"\"float radius\"[1 -2.5e3]# to the end [ \"\nWorldBegin";
         assert_eq!(
             tokens(text),

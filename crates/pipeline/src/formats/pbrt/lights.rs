@@ -1,4 +1,4 @@
-//! Writes lights without shapes, and the environment.
+//! Writes the lights that are not shapes.
 
 use std::f64::consts::PI;
 
@@ -40,7 +40,7 @@ impl SceneWriter<'_> {
             "distant" => self.write_distant(light, &matrix)?,
             "infinite" => self.read_infinite(light, &matrix, infinite)?,
             "goniometric" => {
-                let text = "a point light with the same intensity in all directions is used";
+                let text = "a point light with the same intensity in every direction is used";
                 self.notes.substitute_light("light `goniometric`", text, span);
                 entity.parameters.ignore(&["filename"]);
                 self.write_point(light, &matrix)?;
@@ -57,8 +57,8 @@ impl SceneWriter<'_> {
         entity.parameters.check_all_used()
     }
 
-    /// Returns color · scale, with `scale` changed so that a luminance of 1 has the given `power` or
-    /// `illuminance`. `unit` is the power or the illuminance for a luminance of 1.
+    /// Returns a light's color times its `scale`. `names` are the parameter of the color and the one that
+    /// normalizes it, `power` or `illuminance`, which is `unit` for a light with a luminance of 1.
     fn scaled_color(&self, light: &PlacedEntity, names: [&'static str; 2], unit: f64) -> PbrtResult<DVec3> {
         let [color_name, goal_name] = names;
         let (parameters, space) = (&light.entity.parameters, light.entity.color_space);
@@ -98,11 +98,11 @@ impl SceneWriter<'_> {
             return Err(PbrtError::new(span, "the spotlight has no direction: `from` and `to` are equal"));
         }
         let [end, start] = [cone, cone - delta].map(|angle| libm::cos(angle.to_radians()));
-        // The mean of the smooth edge is 1/2.
+        // The smooth edge has a mean of 1/2.
         let solid_angle = 2.0 * PI * ((1.0 - start) + (start - end) / 2.0);
         let intensity = self.scaled_color(light, ["I", "power"], solid_angle)?;
         if delta > 0.0 {
-            let text = "the edge fades linearly in the angle, and in pbrt smoothly in the cosine";
+            let text = "glimt's edge falls off linearly with the angle, pbrt's smoothly with the cosine";
             self.notes.note("light `spot`", text, light.entity.span());
         }
         self.document.start_list_table("light");
@@ -139,7 +139,7 @@ impl SceneWriter<'_> {
     ) -> PbrtResult<()> {
         let (parameters, span) = (&light.entity.parameters, light.entity.span());
         if parameters.find("portal").is_some() {
-            let text = "the light arrives from everywhere; outside of the portal it is blocked by the scene";
+            let text = "light arrives from all directions, unless the scene blocks it outside the portal";
             self.notes.note("`portal`", text, parameters.span_of("portal"));
         }
         let Some(file) = parameters.string("filename")?.cloned() else {

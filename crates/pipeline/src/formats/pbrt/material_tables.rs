@@ -14,28 +14,28 @@ use crate::scene::nearest::nearest_name;
 use crate::scene::sanitize::escape_and_truncate;
 use std::ops::Range;
 
-/// Light that a shape emits.
+/// Emission of a shape.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Emission {
-    /// Radiance, or the factor on `image`.
+    /// Radiance, or the factor by which `image` is multiplied.
     pub(super) color: DVec3,
-    /// An image of the radiance.
+    /// Image of the radiance.
     pub(super) image: Option<TextureNode>,
     pub(super) is_two_sided: bool,
 }
 
-/// Properties that pbrt gives to a shape and glimt to its material.
+/// Properties that belong to the shape in pbrt, and to the material in glimt.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct ShapeProperties {
     pub(super) emission: Option<Emission>,
     /// The opacity, if it is not 1.
     pub(super) alpha: Option<TextureNode>,
-    /// Transmittance per unit of length inside of dielectrics.
+    /// Transmittance per unit length inside the shape, if it is a dielectric.
     pub(super) tint: Option<DVec3>,
 }
 
 impl SceneWriter<'_> {
-    /// Returns the material of a shape, and adds its table if it is new.
+    /// Returns the material of a shape, adding its table if it is new.
     pub(super) fn material(
         &mut self,
         reference: &MaterialReference,
@@ -52,7 +52,7 @@ impl SceneWriter<'_> {
         lowered
     }
 
-    /// Finds the statement of a material. Also returns its name.
+    /// Finds the statement that defines a material. Also returns a name for its table.
     fn find_material(
         &self,
         reference: &MaterialReference,
@@ -83,10 +83,10 @@ impl SceneWriter<'_> {
         properties: &ShapeProperties,
         depth: usize,
     ) -> PbrtResult<LoweredMaterial> {
-        /// Maximum depth of mixed materials.
+        /// Maximum nesting depth of mixed materials.
         const MAX_DEPTH: usize = 16;
         if depth > MAX_DEPTH {
-            let message = "this material mixes itself, or too many materials are mixed";
+            let message = "this material contains itself, or mixes are nested too deeply";
             return Err(PbrtError::new(span.clone(), message));
         }
         let (entity, name) = self.find_material(reference, span)?;
@@ -101,7 +101,7 @@ impl SceneWriter<'_> {
             MaterialModel::Plain { mut keys, needs_uv, is_glass } => {
                 let has_alpha = properties.alpha.is_some();
                 if is_glass && has_alpha {
-                    let text = "the whole surface exists";
+                    let text = "it is ignored, and the surface has no holes";
                     self.notes.substitute("`alpha` of a dielectric", text, entity.span());
                 }
                 if is_glass && let Some(tint) = properties.tint {
@@ -118,7 +118,7 @@ impl SceneWriter<'_> {
         }
     }
 
-    /// An interface has no surface, unless it emits light.
+    /// Lowers an `interface`, which has no surface unless it emits light.
     fn lower_invisible(&mut self, name: &str, properties: &ShapeProperties) -> LoweredMaterial {
         if properties.emission.is_none() {
             return LoweredMaterial::Invisible;
@@ -151,7 +151,7 @@ impl SceneWriter<'_> {
                     self.notes.substitute_light("`mix` with a dielectric", text, span.clone());
                 }
                 LoweredMaterial::Invisible => {
-                    let message = "an interface cannot be mixed";
+                    let message = "an `interface` material cannot be mixed";
                     return Err(PbrtError::new(span.clone(), message));
                 }
                 LoweredMaterial::Invalid => return Ok(LoweredMaterial::Invalid),
@@ -181,7 +181,7 @@ impl SceneWriter<'_> {
         }
     }
 
-    /// Adds the keys of a shape's properties. Returns whether an image is used.
+    /// Adds the keys for a shape's properties. Returns whether any of them is a texture.
     fn push_shape_keys(
         &mut self,
         keys: &mut TableEntries,

@@ -1,4 +1,4 @@
-//! Converts pbrt's materials.
+//! Converts pbrt materials to keys of glimt materials.
 
 use super::colors::SpectrumUse;
 use super::lexer::{PbrtError, PbrtResult};
@@ -16,13 +16,13 @@ use crate::scene::nearest::nearest_name;
 use crate::scene::sanitize::escape_and_truncate;
 use std::ops::Range;
 
-/// A material that a `mix` names.
+/// Reference to one of the materials of a `mix`.
 pub(super) struct BlendPart {
     pub(super) name: String,
     pub(super) span: Range<usize>,
 }
 
-/// A material without the properties of shapes.
+/// A converted material, without the properties of shapes.
 pub(super) enum MaterialModel {
     Plain {
         keys: TableEntries,
@@ -56,7 +56,7 @@ const MATERIALS: [&str; 12] = [
 const OLD_MATERIALS: [&str; 9] =
     ["matte", "plastic", "metal", "glass", "mirror", "uber", "substrate", "translucent", "fourier"];
 
-/// α below which pbrt's surfaces are smooth.
+/// α below which pbrt treats a surface as smooth.
 const SMOOTH_ALPHA: f64 = 1e-3;
 
 /// Roughness of a microfacet surface.
@@ -64,14 +64,14 @@ enum Roughness {
     Constant {
         /// Square root of α.
         roughness: f64,
-        /// From −1 to 1, along u.
+        /// From −1 to 1. Positive values stretch the highlight along u.
         anisotropy: f64,
     },
     /// A texture of pbrt's roughness values.
     Textured(TextureNode),
 }
 
-/// Reads a material's parameters.
+/// Reads the parameters of a material.
 struct MaterialReader<'w, 'a> {
     writer: &'w mut SceneWriter<'a>,
     parameters: &'w Parameters,
@@ -81,7 +81,7 @@ struct MaterialReader<'w, 'a> {
 }
 
 impl SceneWriter<'_> {
-    /// Reads a material. The type of named materials is a parameter.
+    /// Reads a material. Named materials have their type in a parameter.
     pub(super) fn read_material(&mut self, entity: &Entity, is_named: bool) -> PbrtResult<MaterialModel> {
         let parameters = &entity.parameters;
         let kind = match is_named {
@@ -114,7 +114,7 @@ impl MaterialReader<'_, '_> {
             "coateddiffuse" => self.read_coated_diffuse(entity)?,
             "conductor" => self.read_conductor(false, 1.0)?,
             "coatedconductor" => {
-                let text = "the highlight of the metal is not widened by refraction";
+                let text = "refraction in the coat does not widen the metal's highlight";
                 self.writer.notes.note("material `coatedconductor`", text, entity.span());
                 self.read_coated_conductor()?;
             }
@@ -143,7 +143,7 @@ impl MaterialReader<'_, '_> {
         Ok(MaterialModel::Plain { keys: self.keys, needs_uv: self.needs_uv, is_glass })
     }
 
-    /// Reads a parameter that may be a texture.
+    /// Reads a parameter that may be a texture or a constant.
     fn node(&mut self, name: &'static str, value: TextureValue) -> PbrtResult<Option<TextureNode>> {
         let SceneWriter { resolver, notes, .. } = &mut *self.writer;
         let node = resolver.parameter(self.parameters, name, value, self.space, notes)?;
@@ -151,7 +151,7 @@ impl MaterialReader<'_, '_> {
         Ok(node)
     }
 
-    /// Adds a color key.
+    /// Reads the color parameter `name` into `key`.
     fn color(&mut self, key: &'static str, name: &'static str, default: f64) -> PbrtResult<()> {
         let node = self.node(name, TextureValue::REFLECTANCE)?;
         let node = node.unwrap_or(TextureNode::Constant(DVec3::splat(default)));
@@ -179,7 +179,7 @@ impl MaterialReader<'_, '_> {
         Err(PbrtError::new(span, format!("`{name}` must be between 0.1 and 10")))
     }
 
-    /// Reads roughness from `names`: both directions, u and v.
+    /// Reads a roughness. `names` are the parameters for both directions, for u and for v.
     fn roughness(&mut self, names: [&'static str; 3]) -> PbrtResult<Roughness> {
         let [both, u, v] = names;
         let is_remapped = self.parameters.bool("remaproughness", true)?;
@@ -193,7 +193,7 @@ impl MaterialReader<'_, '_> {
         };
         let (Some(alpha_u), Some(alpha_v)) = (alpha(&along_u), alpha(&along_v)) else {
             if along_u != along_v {
-                let text = "only the texture along u is used";
+                let text = "one of the textures is used in both directions";
                 let span = self.parameters.span_of(u);
                 self.writer.notes.substitute("roughness textures along u and v", text, span);
             }
@@ -208,7 +208,7 @@ impl MaterialReader<'_, '_> {
         let ratio = alpha_u.min(alpha_v) / alpha_u.max(alpha_v);
         let size = ((1.0 - ratio) / 0.9).min(1.0);
         if ratio < 0.099 {
-            let text = "the longer side of the highlight is 10 times the shorter one";
+            let text = "the highlight is only 10 times as long as it is wide";
             self.writer.notes.substitute("strong anisotropy", text, self.parameters.span_of(u));
         }
         let anisotropy = if alpha_v > alpha_u { -size } else { size };
@@ -268,7 +268,8 @@ impl MaterialReader<'_, '_> {
         self.isotropic_roughness("roughness", ["roughness", "uroughness", "vroughness"])
     }
 
-    /// Reads a conductor under air, or under a coat with an index of refraction of `coat_ior`.
+    /// Reads a conductor, either in air (`coat_ior` is 1) or under a coat with the index of refraction
+    /// `coat_ior`.
     fn read_conductor(&mut self, is_coated: bool, coat_ior: f64) -> PbrtResult<()> {
         let [eta_name, k_name] = if is_coated { ["conductor.eta", "conductor.k"] } else { ["eta", "k"] };
         let roughness = match is_coated {
@@ -303,7 +304,7 @@ impl MaterialReader<'_, '_> {
         Ok(())
     }
 
-    /// The index of refraction with the given reflectance at normal incidence has η = 1.
+    /// Adds the complex index of refraction with η = 1 that has the given reflectance at normal incidence.
     fn push_reflectance(&mut self, reflectance: &TextureNode, coat_ior: f64) {
         match reflectance.as_constant() {
             Some(color) => {
@@ -317,14 +318,14 @@ impl MaterialReader<'_, '_> {
             None => {
                 let value = self.writer.color_value(reflectance);
                 self.keys.push(("color", value));
-                let text = "at grazing angles, Schlick's approximation is used";
+                let text = "Schlick's approximation is used at grazing angles";
                 let span = self.parameters.span_of("reflectance");
-                self.writer.notes.note("a texture as the `reflectance` of a conductor", text, span);
+                self.writer.notes.note("a textured `reflectance` of a conductor", text, span);
             }
         }
     }
 
-    /// The default is copper.
+    /// Adds η and k relative to the coat. The default is copper.
     fn push_complex_ior(&mut self, eta: Option<TextureNode>, k: Option<TextureNode>, coat_ior: f64) {
         let [copper_eta, copper_k] = NamedConductor::Cu.complex_ior().map(Vec3::as_dvec3);
         for (key, node, copper) in [("eta", eta, copper_eta), ("k", k, copper_k)] {
@@ -359,7 +360,7 @@ impl MaterialReader<'_, '_> {
         Ok(())
     }
 
-    /// Substitutes a subsurface material with a diffuse base of its albedo under a smooth coat.
+    /// Replaces a subsurface material with a diffuse base of the same albedo under a dielectric coat.
     fn read_subsurface(&mut self, entity: &Entity) -> PbrtResult<()> {
         self.keys.push(("type", "plastic".into()));
         let unbounded = TextureValue::Color(SpectrumUse::Unbounded);
@@ -402,7 +403,7 @@ impl MaterialReader<'_, '_> {
         let names = self.parameters.strings("materials")?;
         let [first, second] = names else {
             let span = self.parameters.span_of("materials");
-            return Err(PbrtError::new(span, "a mix needs `materials` with two names"));
+            return Err(PbrtError::new(span, "a mix needs two names in `materials`"));
         };
         let part = |text: &Text| BlendPart { name: text.text.clone(), span: text.span.clone() };
         let parts = [part(first), part(second)];
@@ -411,7 +412,7 @@ impl MaterialReader<'_, '_> {
         Ok(MaterialModel::Blend { parts, amount })
     }
 
-    /// Reads `displacement`, which perturbs the normals.
+    /// Reads `displacement`, which becomes a bump map.
     fn read_bump(&mut self) -> PbrtResult<()> {
         let Some(node) = self.node("displacement", TextureValue::Number)? else { return Ok(()) };
         let node = self.writer.without_missing_images(&node);
@@ -419,7 +420,7 @@ impl MaterialReader<'_, '_> {
             return Ok(());
         }
         let span = self.parameters.span_of("displacement");
-        let text = "light fades where the relief is steep, by 2 % at 7 degrees";
+        let text = "shading darkens where the bumps are steep, by 2 % at 7 degrees";
         self.writer.notes.note("`displacement`", text, span);
         let (name, scale) = self.writer.height_texture(&node);
         let texture = BuiltValue::Table(vec![("texture", name.into()), ("channel", "r".into())]);
@@ -470,7 +471,7 @@ fn diffusion_albedo(absorption: DVec3, scattering: DVec3, asymmetry: f64) -> DVe
 fn unknown_material(kind: &str, at: &Text) -> Box<PbrtError> {
     let shown = escape_and_truncate(kind, 40);
     if OLD_MATERIALS.contains(&kind) || kind == "kdsubsurface" || kind == "disney" {
-        let error = PbrtError::new(at.span.clone(), format!("\"{shown}\" is a material of pbrt-v3"));
+        let error = PbrtError::new(at.span.clone(), format!("\"{shown}\" is a pbrt-v3 material"));
         return error.with_help(super::parameters::V3_HELP);
     }
     let error = PbrtError::new(at.span.clone(), format!("unknown material \"{shown}\""));

@@ -1,5 +1,4 @@
-//! Results of work on files that are kept between two versions of a scene, so that an edit of the text does not
-//! repeat it.
+//! Caches results computed from asset files, so that reloading a scene after an edit does not recompute them.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -7,14 +6,14 @@ use std::sync::{LazyLock, Mutex, PoisonError};
 
 use crate::system::file::FileStamp;
 
-/// Maximum number of images to remember.
+/// Maximum number of cached images.
 const MAX_IMAGES: usize = 10_000;
 
 static GRAY_IMAGES: LazyLock<Mutex<HashMap<PathBuf, (FileStamp, bool)>>> = LazyLock::new(Mutex::default);
 
 static ENVIRONMENT: Mutex<Option<(String, Vec<u8>)>> = Mutex::new(None);
 
-/// Returns whether the image with this stamp is gray, if it has been asked before. Otherwise, calls `find`.
+/// Returns whether the image is gray. Calls `find` unless the result for this path and stamp is cached.
 pub(super) fn is_gray(path: &Path, stamp: Option<FileStamp>, find: impl FnOnce() -> bool) -> bool {
     let lock = || GRAY_IMAGES.lock().unwrap_or_else(PoisonError::into_inner);
     let known = lock().get(path).filter(|(known, _)| Some(*known) == stamp).map(|(_, is_gray)| *is_gray);
@@ -31,7 +30,7 @@ pub(super) fn is_gray(path: &Path, stamp: Option<FileStamp>, find: impl FnOnce()
     })
 }
 
-/// Returns the last environment map if it has the same key. Otherwise, calls `make`.
+/// Returns the environment map for a key. Calls `make` unless the last map had the same key.
 pub(super) fn environment(key: String, make: impl FnOnce() -> Vec<u8>) -> Vec<u8> {
     let lock = || ENVIRONMENT.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some((_, bytes)) = lock().as_ref().filter(|(known, _)| *known == key) {
@@ -53,7 +52,7 @@ mod tests {
         std::fs::write(&path, "a").expect("written");
         let stamp = FileStamp::from_path(&path);
         assert!(is_gray(&path, stamp, || true));
-        assert!(is_gray(&path, stamp, || false), "kept");
+        assert!(is_gray(&path, stamp, || false), "cached");
         std::fs::write(&path, "ab").expect("written");
         assert!(!is_gray(&path, FileStamp::from_path(&path), || false));
         assert_eq!(environment("first of test".to_owned(), || vec![1]), [1]);

@@ -1,4 +1,4 @@
-//! Writes shapes whose mesh is in a file.
+//! Writes `plymesh` shapes, whose meshes are in files.
 
 use std::io::Read;
 use std::path::Path;
@@ -17,9 +17,9 @@ use crate::system::file::FileStamp;
 
 /// Maximum size of a decompressed mesh.
 const MAX_MESH_BYTES: u64 = 4 << 30;
-/// Files below this size are read early, to skip meshes without area.
+/// Files below this size are read immediately, in order to skip meshes without area.
 const SMALL_FILE_BYTES: u64 = 2048;
-/// Start of the message for a mesh without area.
+/// Start of the loader's message for a mesh without area.
 const NO_USABLE_FACE: &str = "no usable face";
 
 /// Properties of a mesh file that are read before the file is loaded.
@@ -30,7 +30,8 @@ struct MeshHeader {
 }
 
 impl SceneWriter<'_> {
-    /// Writes a `plymesh`. The file is read later, with all others, unless its faces must be turned.
+    /// Writes a `plymesh`. Its file is loaded later, with all other assets, unless the importer must
+    /// decompress or change the mesh.
     pub(super) fn write_mesh_file(
         &mut self,
         parameters: &Parameters,
@@ -38,7 +39,7 @@ impl SceneWriter<'_> {
     ) -> PbrtResult<()> {
         let file = mesh_file_name(parameters)?.clone();
         if parameters.find("displacement").is_some() {
-            let text = "the surface keeps its shape";
+            let text = "the surface is not displaced";
             let span = parameters.span_of("displacement");
             self.notes.substitute("`displacement` of a shape", text, span);
         }
@@ -48,7 +49,7 @@ impl SceneWriter<'_> {
         }
         let is_compressed = is_gzip(&file.text);
         if !is_compressed && !file.text.to_lowercase().ends_with(".ply") {
-            let error = PbrtError::new(file.span, "`plymesh` reads PLY files");
+            let error = PbrtError::new(file.span, "`plymesh` can only read PLY files");
             return Err(error.with_help("the file name must end with .ply or .ply.gz"));
         }
         let path = self.asset_path(&file.text);
@@ -136,8 +137,7 @@ fn stem(file: &str) -> String {
     name.split('.').next().unwrap_or_default().to_owned()
 }
 
-/// Reads the header of a PLY file. Returns `None` if the file is not readable, which is reported when it is
-/// loaded.
+/// Reads the header of a PLY file. Returns `None` if the file is unreadable, which loading it will report.
 fn read_header(path: &Path) -> Option<MeshHeader> {
     /// Maximum size of a header.
     const MAX_HEADER: u64 = 4096;

@@ -15,7 +15,7 @@ pub(super) struct MeshData {
 }
 
 impl MeshData {
-    /// Copies a mesh that was read from a file.
+    /// Copies a mesh loaded from a file.
     pub(super) fn from_loaded(loaded: &LoadedMesh) -> Self {
         let mesh = &loaded.mesh;
         Self {
@@ -26,20 +26,20 @@ impl MeshData {
         }
     }
 
-    /// The cross product of a triangle's edges.
+    /// The cross product of two edges of a triangle, whose length is twice its area.
     fn area_vector(&self, [a, b, c]: [u32; 3]) -> DVec3 {
         let [a, b, c] = [a, b, c].map(|vertex| self.positions[vertex as usize]);
         (b - a).cross(c - a)
     }
 
-    /// Twice the area of a triangle whose corners are transformed by `matrix`.
+    /// The area of a triangle transformed by `matrix`.
     pub(super) fn transformed_area(&self, triangle: [u32; 3], matrix: &crate::math::DMat4) -> f64 {
         let [a, b, c] = triangle.map(|vertex| matrix.transform_point3(self.positions[vertex as usize]));
         0.5 * (b - a).cross(c - a).length()
     }
 
-    /// Turns the front sides as pbrt does: they follow the normals, if there are any. `is_reversed` swaps
-    /// front and back and negates the normals.
+    /// Orients the triangles as pbrt does. The front of a triangle is on the side of its vertex normals or,
+    /// if there are none, follows its winding. `is_reversed` flips the front and the normals.
     pub(super) fn orient(&mut self, is_reversed: bool) {
         if is_reversed {
             self.normals.iter_mut().for_each(|normal| *normal = -*normal);
@@ -65,7 +65,8 @@ impl MeshData {
         self.triangles = triangles;
     }
 
-    /// Gives every triangle the texture coordinates (0, 0), (1, 0) and (1, 1), the default of pbrt.
+    /// Assigns pbrt's default texture coordinates (0, 0), (1, 0) and (1, 1) to the corners of each triangle,
+    /// if there are no texture coordinates.
     pub(super) fn add_default_uvs(&mut self) {
         if !self.uvs.is_empty() {
             return;
@@ -81,8 +82,8 @@ impl MeshData {
             (0..self.triangles.len() as u32).map(|index| [0, 1, 2].map(|k| 3 * index + k)).collect();
     }
 
-    /// Splits a parametric surface into a grid of `columns` by `rows` cells. `surface` returns the position
-    /// and the normal at (u, v).
+    /// Tessellates a parametric surface as a grid of `columns` by `rows` cells. `surface` returns the
+    /// position and normal at (u, v).
     pub(super) fn from_surface([columns, rows]: [u32; 2], surface: impl Fn(DVec2) -> (DVec3, DVec3)) -> Self {
         let mut mesh = Self::default();
         for row in 0..=rows {
@@ -105,7 +106,7 @@ impl MeshData {
         mesh
     }
 
-    /// Encodes the mesh as binary PLY in double precision.
+    /// Encodes the mesh as binary PLY, with positions in double precision.
     pub(super) fn encode(&self) -> Vec<u8> {
         let (has_normals, has_uvs) = (!self.normals.is_empty(), !self.uvs.is_empty());
         let mut header = format!(

@@ -1,8 +1,8 @@
 //! Reads and imports pbrt-v4 scenes.
 //!
 //! [`parser`] collects the statements of all files, [`texture_nodes`] resolves textures, and [`scene`] writes
-//! the tables of a scene document. The world keeps its left-handed coordinates: only the camera mirrors the
-//! image. Facts about the format are from pbrt-v4's documentation and, where it is silent, from its behavior.
+//! the tables of a scene document. Coordinates stay left-handed; instead, the camera mirrors the image. The
+//! readers follow pbrt-v4's documentation and, where it is silent, its behavior.
 
 mod bake;
 mod colors;
@@ -49,7 +49,7 @@ pub(super) fn read(path: &Path, context: &ForeignReadContext<'_>) -> Result<Fore
     read_scene(path, None, context).map(|(scene, _)| scene)
 }
 
-/// Converts a scene to a scene file, and to files in `folder` that contain its meshes and images.
+/// Converts a scene to a scene file, with its meshes and images in `folder`.
 pub(super) fn convert(
     path: &Path,
     folder: &str,
@@ -64,8 +64,8 @@ pub(super) fn convert(
     Ok(ImportedScene { document, files, substitutions, notes })
 }
 
-/// Reads a scene. `import` is the folder for the assets of an imported scene. Also returns the files to copy
-/// into it.
+/// Reads a scene. For an import, `import` is the folder for the assets, and the files to copy into it are
+/// returned as well.
 fn read_scene(
     path: &Path,
     import: Option<&str>,

@@ -1,4 +1,4 @@
-//! Writes shapes in the order of the file, objects and their instances.
+//! Writes the shapes, in file order, then the objects and their instances.
 
 use std::collections::HashMap;
 
@@ -49,7 +49,11 @@ impl SceneWriter<'_> {
             };
             let matrix = self.still_transform(instance.transform, instance.name.span.clone());
             if !is_invertible_affine(&matrix) {
-                self.notes.note("an instance without extent", "skipped", instance.name.span.clone());
+                self.notes.note(
+                    "an instance with a singular transform",
+                    "skipped",
+                    instance.name.span.clone(),
+                );
                 continue;
             }
             self.document.set_span_for_next_values(instance.name.span.clone());

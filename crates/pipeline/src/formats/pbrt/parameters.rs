@@ -46,7 +46,7 @@ const TYPES: [(&str, ParameterType); 13] = [
     ("blackbody", ParameterType::Blackbody),
 ];
 
-/// Types that only pbrt-v3 has.
+/// Types that exist only in pbrt-v3.
 const OLD_TYPES: [&str; 5] = ["color", "xyz", "point", "vector", "normal3"];
 
 impl ParameterType {
@@ -60,39 +60,39 @@ impl ParameterType {
 pub(super) struct Parameter {
     pub(super) kind: ParameterType,
     pub(super) name: String,
-    /// The declaration.
+    /// Span of the declaration.
     pub(super) span: Range<usize>,
-    /// The values.
+    /// Span of the values.
     pub(super) values_span: Range<usize>,
     pub(super) values: Values,
-    /// Whether the parameter is a default from an `Attribute` statement, which need not be used.
+    /// Whether the parameter is a default from an `Attribute` statement, which may remain unused.
     is_default: bool,
     is_used: Cell<bool>,
 }
 
-/// Maximum number of parameters of a statement.
+/// Maximum number of parameters in a statement.
 const MAX_PARAMETERS: usize = 1000;
 
 /// The parameters of a statement.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Parameters {
     list: Vec<Rc<Parameter>>,
-    /// The statement's first word and type.
+    /// Span of the statement's directive and type.
     pub(super) span: Range<usize>,
-    /// Names that the reader has asked for.
+    /// Names that have been looked up.
     asked: RefCell<Vec<&'static str>>,
 }
 
 impl Parameters {
-    /// Parses all parameters that follow. `span` is the place of the statement's first words.
+    /// Parses the parameters of a statement. `span` is the span of its directive and type.
     pub(super) fn parse(lexer: &mut Lexer<'_>, span: Range<usize>) -> PbrtResult<Self> {
         let mut parsed = Self { span, ..Self::default() };
         while let Some(token) = lexer.peek()?.filter(|token| token.kind == TokenKind::Quoted) {
             lexer.next()?;
             let parameter = parse_parameter(&token, lexer)?;
             if parsed.list.iter().any(|known| known.name == parameter.name) {
-                let message = format!("the parameter `{}` is given twice", shown(&parameter.name));
-                return Err(PbrtError::new(parameter.span, message).with_help("remove one of the two"));
+                let message = format!("the parameter `{}` appears twice", shown(&parameter.name));
+                return Err(PbrtError::new(parameter.span, message).with_help("remove one of them"));
             }
             if parsed.list.len() >= MAX_PARAMETERS {
                 let message = format!("a statement can have at most {MAX_PARAMETERS} parameters");
@@ -103,7 +103,7 @@ impl Parameters {
         Ok(parsed)
     }
 
-    /// Adds defaults from `Attribute` statements, for parameters that the statement does not have.
+    /// Adds the defaults from `Attribute` statements for absent parameters. Later defaults take precedence.
     pub(super) fn add_defaults(&mut self, defaults: &[Rc<Parameter>]) {
         for default in defaults.iter().rev() {
             if !self.list.iter().any(|known| known.name == default.name) {
@@ -120,7 +120,7 @@ impl Parameters {
         })
     }
 
-    /// Returns a parameter of any type.
+    /// Returns a parameter of any type, and marks it as used.
     pub(super) fn find(&self, name: &'static str) -> Option<&Parameter> {
         self.asked.borrow_mut().push(name);
         let found = self.list.iter().find(|parameter| parameter.name == name)?;
@@ -128,14 +128,14 @@ impl Parameters {
         Some(found)
     }
 
-    /// Marks parameters as known that have no effect on the image.
+    /// Marks parameters as used that glimt does not need.
     pub(super) fn ignore(&self, names: &[&'static str]) {
         for name in names {
             self.find(name);
         }
     }
 
-    /// Returns a parameter, which must have one of the types.
+    /// Returns a parameter, or an error unless it has one of the types.
     fn of_type(&self, name: &'static str, kinds: &[ParameterType]) -> PbrtResult<Option<&Parameter>> {
         let Some(found) = self.find(name) else { return Ok(None) };
         if kinds.contains(&found.kind) {
@@ -146,7 +146,7 @@ impl Parameters {
         Err(PbrtError::new(found.span.clone(), message).with_label(format!("found {}", found.kind.name())))
     }
 
-    /// Reads all numbers of a parameter, which must be a multiple of `count`.
+    /// Reads the numbers of a parameter, or returns an error unless their number is a multiple of `count`.
     fn numbers(&self, name: &'static str, kinds: &[ParameterType], count: usize) -> PbrtResult<&[f64]> {
         let Some(found) = self.of_type(name, kinds)? else { return Ok(&[]) };
         let numbers = found.numbers()?;
@@ -170,12 +170,12 @@ impl Parameters {
         found.single(found.numbers()?).map(|number| Some(*number))
     }
 
-    /// Reads a number, which must be above 0.
+    /// Reads a number, or returns an error unless it is greater than 0.
     pub(super) fn positive_float(&self, name: &'static str, default: f64) -> PbrtResult<f64> {
         let number = self.float(name, default)?;
         match self.find(name) {
             Some(found) if number <= 0.0 => {
-                Err(PbrtError::new(found.values_span.clone(), format!("`{name}` must be above 0")))
+                Err(PbrtError::new(found.values_span.clone(), format!("`{name}` must be greater than 0")))
             }
             Some(_) | None => Ok(number),
         }
@@ -186,13 +186,13 @@ impl Parameters {
         let whole = |number: &f64| {
             let is_whole = number.fract() == 0.0 && number.abs() <= f64::from(i32::MAX);
             is_whole.then_some(*number as i64).ok_or_else(|| {
-                PbrtError::new(found.values_span.clone(), format!("`{name}` must be whole numbers"))
+                PbrtError::new(found.values_span.clone(), format!("`{name}` must be integers"))
             })
         };
         found.numbers()?.iter().map(whole).collect()
     }
 
-    /// Reads an integer in a range.
+    /// Reads an integer, or returns an error if it is out of range.
     pub(super) fn integer(
         &self,
         name: &'static str,
@@ -220,7 +220,7 @@ impl Parameters {
         }
     }
 
-    /// Reads a string. Empty strings count as absent.
+    /// Reads a string. Treats empty strings as absent.
     pub(super) fn string(&self, name: &'static str) -> PbrtResult<Option<&Text>> {
         let Some(found) = self.of_type(name, &[ParameterType::String])? else { return Ok(None) };
         found.single(found.texts()?).map(|text| Some(text).filter(|text| !text.text.is_empty()))
@@ -261,12 +261,12 @@ impl Parameters {
         found.single(&all).copied()
     }
 
-    /// The place of a parameter's values, or of the statement if it is absent.
+    /// Span of a parameter's values, or of the statement if the parameter is absent.
     pub(super) fn span_of(&self, name: &'static str) -> Range<usize> {
         self.find(name).map_or_else(|| self.span.clone(), |found| found.values_span.clone())
     }
 
-    /// Returns an error if there is a parameter that nothing has asked for.
+    /// Returns an error if the statement has an unknown parameter, that is, one that was never looked up.
     pub(super) fn check_all_used(&self) -> PbrtResult<()> {
         let is_wrong = |parameter: &&Rc<Parameter>| !parameter.is_default && !parameter.is_used.get();
         let Some(wrong) = self.list.iter().find(is_wrong) else { return Ok(()) };
@@ -300,7 +300,7 @@ impl Parameter {
         }
     }
 
-    /// Returns the only one of `values`.
+    /// Returns the only element of `values`, or an error unless there is exactly one.
     pub(super) fn single<'a, T>(&self, values: &'a [T]) -> PbrtResult<&'a T> {
         match values {
             [one] => Ok(one),
@@ -321,8 +321,8 @@ fn parse_parameter(declaration: &Token<'_>, lexer: &mut Lexer<'_>) -> PbrtResult
     let span = declaration.span.clone();
     let mut words = declaration.text.split([' ', '\t']).filter(|word| !word.is_empty());
     let (Some(kind), Some(name), None) = (words.next(), words.next(), words.next()) else {
-        let error = PbrtError::new(span, "a parameter is declared by its type and its name");
-        return Err(error.with_help("such as \"float radius\""));
+        let error = PbrtError::new(span, "a parameter needs a type and a name");
+        return Err(error.with_help("for example, \"float radius\""));
     };
     let Some((_, kind)) = TYPES.iter().find(|(known, _)| *known == kind) else {
         return Err(unknown_type(kind, span));
@@ -335,12 +335,12 @@ fn parse_parameter(declaration: &Token<'_>, lexer: &mut Lexer<'_>) -> PbrtResult
 fn unknown_type(kind: &str, span: Range<usize>) -> Box<PbrtError> {
     let error = PbrtError::new(span, format!("unknown parameter type `{}`", shown(kind)));
     if OLD_TYPES.contains(&kind) {
-        return error.with_label("this is a type of pbrt-v3").with_help(V3_HELP);
+        return error.with_label("this is a pbrt-v3 type").with_help(V3_HELP);
     }
     error.with_suggestion(nearest_name(kind, TYPES.iter().map(|(name, _)| *name)))
 }
 
-/// How to convert files of pbrt-v3.
+/// Help for pbrt-v3 features.
 pub(super) const V3_HELP: &str =
     "glimt reads pbrt-v4 scenes; `pbrt --upgrade OLD.pbrt > NEW.pbrt` (of pbrt-v4) converts older ones";
 
@@ -353,7 +353,7 @@ mod tests {
     }
 
     #[test]
-    fn values_may_lack_brackets() {
+    fn brackets_around_single_values_are_optional() {
         let parsed =
             parse("\"float fov\" 30 \"bool b\" true \"string s\" [ \"x\" ] \"point3 P\" [0 1 2 # c\n 3 4 5]");
         let parsed = parsed.expect("parameters");
@@ -368,7 +368,7 @@ mod tests {
     }
 
     #[test]
-    fn wrong_parameters_are_underlined() {
+    fn invalid_parameters_are_underlined() {
         let place = |text: &str| {
             let error = parse(text).expect_err("an error");
             (text[error.span.clone()].to_owned(), error.message)
@@ -399,7 +399,7 @@ mod tests {
     }
 
     #[test]
-    fn defaults_are_used_last() {
+    fn own_parameters_override_defaults() {
         let (mut own, defaults) =
             (parse("\"float a\" 1"), parse("\"float a\" 2 \"float b\" 3 \"float c\" 4"));
         let defaults: Vec<_> = defaults.expect("parameters").into_defaults().collect();
@@ -412,7 +412,7 @@ mod tests {
     }
 
     #[test]
-    fn old_types_name_the_version() {
+    fn pbrt_v3_types_are_explained() {
         let error = parse("\"color Kd\" [1 1 1]").expect_err("an error");
         assert!(error.label.contains("pbrt-v3") && error.help.is_some());
     }

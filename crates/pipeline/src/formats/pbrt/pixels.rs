@@ -1,8 +1,8 @@
-//! Images in memory, and their encoding as PFM.
+//! In-memory images and their encoding as PFM.
 
 use crate::math::{DVec2, DVec3, Vec3};
 
-/// An image of linear values, from the top row to the bottom row.
+/// An image of linear values, with the top row first.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Pixels {
     pub(super) width: usize,
@@ -16,8 +16,8 @@ impl Pixels {
         self.values[row * self.width + column].as_dvec3()
     }
 
-    /// Interpolates between texel centers. `at` is in pixels from the top left corner. `index` maps columns
-    /// and rows outside of the image to columns and rows inside, or returns `None` for black.
+    /// Interpolates between texel centers. `at` is in pixels from the top left corner. `index` maps a column
+    /// or row, which may be outside the image, to one inside, or returns `None` for black.
     pub(super) fn bilinear(&self, at: DVec2, index: impl Fn(i64, usize) -> Option<usize>) -> DVec3 {
         let corner = (at - 0.5).floor();
         let part = at - 0.5 - corner;
@@ -35,7 +35,7 @@ impl Pixels {
         let magic = if is_gray { "Pf" } else { "PF" };
         let mut bytes = format!("{magic}\n{} {}\n-1.0\n", self.width, self.height).into_bytes();
         bytes.reserve(self.values.len() * if is_gray { 4 } else { 12 });
-        // PFM starts with the bottom row.
+        // PFM stores the bottom row first.
         for row in self.values.chunks_exact(self.width).rev() {
             for value in row {
                 let channels = value.to_array();
@@ -52,7 +52,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rows_are_written_from_the_bottom() {
+    fn bottom_row_is_written_first() {
         let pixels = Pixels { width: 1, height: 2, values: vec![Vec3::ONE, Vec3::new(0.5, 0.25, 0.0)] };
         let bytes = pixels.encode_pfm(false);
         let header = b"PF\n1 2\n-1.0\n";

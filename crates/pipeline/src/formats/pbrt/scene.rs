@@ -22,14 +22,14 @@ use crate::system::file::{FileKind, file_kind};
 /// Maximum number of errors to report.
 const MAX_ERRORS: usize = 50;
 
-/// Where the meshes and images of the document are.
+/// Where the document's meshes and images are stored.
 pub(super) struct AssetLocation<'a> {
     /// Folder of the pbrt file.
     pub(super) source: PathBuf,
     /// Name of the pbrt file.
     pub(super) file: String,
-    /// Folder next to the imported scene into which `glimt import` copies all files. `None` if the files stay
-    /// where they are.
+    /// Folder, relative to the imported scene, into which `glimt import` copies all files. `None` to use the
+    /// original files.
     pub(super) import: Option<&'a str>,
     /// Files to copy.
     pub(super) copies: Vec<CopiedFile>,
@@ -44,7 +44,7 @@ impl<'a> AssetLocation<'a> {
         Self { source, file, import, copies: Vec::new(), names: UsedNames::default(), known: HashMap::new() }
     }
 
-    /// Returns the name of an existing file in the document.
+    /// Returns the document's name for an existing file, and schedules the copy for an import.
     fn name(&mut self, file: &str) -> String {
         let Some(folder) = self.import else { return file.to_owned() };
         let path = self.source.join(file);
@@ -66,7 +66,9 @@ impl<'a> AssetLocation<'a> {
     }
 }
 
-/// A material with the properties of a shape, formatted.
+/// Identity of a material table: the pbrt material and the formatted [`ShapeProperties`].
+///
+/// [`ShapeProperties`]: super::material_tables::ShapeProperties
 pub(super) type MaterialIdentity = (MaterialReference, String);
 
 /// A material in the document.
@@ -76,16 +78,16 @@ pub(super) enum LoweredMaterial {
         name: String,
         /// Whether it uses texture coordinates or tangents.
         needs_uv: bool,
-        /// Whether the front differs from the back.
+        /// Whether its surfaces enclose an interior, as dielectrics do.
         has_inside: bool,
     },
-    /// Shapes without a surface.
+    /// Shapes with this material have no surface.
     Invisible,
-    /// An error has been reported.
+    /// The material has an error, which has been reported.
     Invalid,
 }
 
-/// Writes a scene.
+/// Writes the scene document.
 pub(super) struct SceneWriter<'a> {
     pub(super) statements: &'a Statements,
     pub(super) resolver: TextureResolver<'a>,
@@ -96,12 +98,12 @@ pub(super) struct SceneWriter<'a> {
     pub(super) options: &'a ForeignOptions,
     pub(super) token: &'a CancelToken,
     pub(super) companions: Vec<Companion>,
-    /// Names of the textures by their formatted keys.
+    /// Names of texture tables by their formatted keys.
     pub(super) textures: HashMap<String, String>,
     pub(super) texture_names: UsedNames,
     pub(super) material_names: UsedNames,
     pub(super) materials: HashMap<MaterialIdentity, LoweredMaterial>,
-    /// Generated files by their hash.
+    /// Names of generated files by content hash.
     generated_names: HashMap<[u8; 32], String>,
 }
 
@@ -142,7 +144,7 @@ impl<'a> SceneWriter<'a> {
         self.write_objects();
     }
 
-    /// Keeps an error and returns the value of a success.
+    /// Records the error of a failed operation, or returns the result of a successful one.
     pub(super) fn attempt<T>(&mut self, result: PbrtResult<T>) -> Option<T> {
         match result {
             Ok(value) => Some(value),
@@ -155,23 +157,23 @@ impl<'a> SceneWriter<'a> {
         }
     }
 
-    /// Whether enough errors have been found.
+    /// Whether the maximum number of errors has been reached.
     pub(super) fn has_too_many_errors(&self) -> bool {
         self.errors.len() >= MAX_ERRORS
     }
 
-    /// Returns the value of the key `file` for an existing file.
+    /// Returns the `file` key's value for an existing file.
     pub(super) fn asset_name(&mut self, file: &Text) -> String {
         self.document.set_span_for_next_values(file.span.clone());
         self.assets.name(&file.text)
     }
 
-    /// The path of an asset.
+    /// Path of an asset in the pbrt scene.
     pub(super) fn asset_path(&self, file: &str) -> PathBuf {
         self.assets.source.join(file)
     }
 
-    /// Whether a file is missing although missing files are tolerated. Adds a substitution.
+    /// Whether a file is missing and `--missing note` tolerates that. If so, adds a substitution.
     pub(super) fn is_tolerated_missing(&mut self, file: &Text, what: &str, substitute: &str) -> bool {
         let is_file = matches!(file_kind(&self.asset_path(&file.text)), Ok((FileKind::Regular, _)));
         if is_file || self.options.missing != MissingAssetMode::Note {
@@ -182,7 +184,7 @@ impl<'a> SceneWriter<'a> {
         true
     }
 
-    /// Adds a file that exists only in memory, and returns the value of the key `file`.
+    /// Adds a file that exists only in memory, and returns the `file` key's value for it.
     pub(super) fn add_generated_file(&mut self, stem: &str, extension: &str, bytes: Vec<u8>) -> String {
         let hash = *blake3::hash(&bytes).as_bytes();
         if let Some(known) = self.generated_names.get(&hash) {
@@ -191,7 +193,7 @@ impl<'a> SceneWriter<'a> {
         let stem = if stem.is_empty() { "part" } else { stem };
         let name = match self.assets.import {
             Some(folder) => self.assets.unique_name(folder, stem, extension),
-            // The name depends only on the content, so that edits elsewhere in the file keep what is cached.
+            // Derive the name only from the content, so that edits elsewhere do not invalidate caches.
             None => format!(
                 "{}/{stem}-{}.{extension}",
                 self.assets.file,
@@ -204,11 +206,11 @@ impl<'a> SceneWriter<'a> {
         name
     }
 
-    /// Returns the first of two transforms, and adds a substitution if the second differs.
+    /// Returns the transform at the start time. Adds a substitution if the transform at the end time differs.
     pub(super) fn still_transform(&mut self, transform: [DMat4; 2], span: Range<usize>) -> DMat4 {
         let [start, end] = transform;
         if start != end {
-            self.notes.substitute("motion", "everything stays where it is at the start", span);
+            self.notes.substitute("motion", "only the transform at the start time is used", span);
         }
         start
     }

@@ -1,4 +1,4 @@
-//! Writes `[render]`, `[camera]` and `[photons]`.
+//! Writes the `[render]`, `[camera]` and `[photons]` tables.
 
 use super::lexer::{PbrtError, PbrtResult};
 use super::parameters::{ParameterType, Parameters};
@@ -8,12 +8,12 @@ use crate::formats::foreign::transform::{is_mirroring, linear_part};
 use crate::math::{DMat3, DMat4, DVec2, DVec3};
 use crate::scene::nearest::nearest_name;
 
-/// A film: its size, and the part of it that is rendered.
+/// Size, crop and exposure of the film.
 struct Film {
     size: [i64; 2],
-    /// First column and row, and the column and row after the last.
+    /// The rendered part: its first column and row, and the column and row after its last.
     crop: [i64; 4],
-    /// Factor on the light, without the exposure time.
+    /// Exposure factor, without the exposure time.
     gain: f64,
 }
 
@@ -57,11 +57,11 @@ impl SceneWriter<'_> {
         }
         let white = parameters.float("whitebalance", 0.0)?;
         if white != 0.0 && (white - 6500.0).abs() > 50.0 {
-            let text = "the image keeps the colors of the light";
+            let text = "the image is not white balanced";
             self.notes.substitute("`whitebalance`", text, parameters.span_of("whitebalance"));
         }
         if parameters.optional_float("maxcomponentvalue")?.is_some() {
-            let text = "samples are not clamped, so rare bright samples remain";
+            let text = "samples are not clamped, so fireflies may remain";
             self.notes.note("`maxcomponentvalue`", text, parameters.span_of("maxcomponentvalue"));
         }
         let gain = parameters.positive_float("iso", 100.0)? / 100.0;
@@ -114,13 +114,13 @@ impl SceneWriter<'_> {
         match kind {
             "sppm" => self.write_photons(parameters)?,
             "ao" | "function" => {
-                let text = "the light is computed with paths instead";
+                let text = "path tracing is used instead";
                 self.notes.substitute_light(&format!("integrator `{kind}`"), text, integrator.span());
                 self.document.set("integrator", "path");
             }
             _ if PATHS.contains(&kind) => self.document.set("integrator", "path"),
             "directlighting" | "whitted" => {
-                let error = PbrtError::new(integrator.kind.span.clone(), "this integrator is of pbrt-v3");
+                let error = PbrtError::new(integrator.kind.span.clone(), "this is a pbrt-v3 integrator");
                 return Err(error.with_help(super::parameters::V3_HELP));
             }
             _ => {
@@ -130,11 +130,11 @@ impl SceneWriter<'_> {
             }
         }
         let depth = parameters.integer("maxdepth", 5, 0..=i64::from(i32::MAX))?;
-        // Longer paths carry no light that can be seen.
+        // Longer paths contribute no visible light.
         self.document.set_span_for_next_values(parameters.span_of("maxdepth"));
         self.document.set("max_depth", depth.min(1000) as f64);
         if parameters.bool("regularize", false)? {
-            let text = "rough surfaces are not made rougher after the first bounce";
+            let text = "surfaces are not made rougher after the first bounce";
             self.notes.note("`regularize`", text, parameters.span_of("regularize"));
         }
         parameters.ignore(&[
@@ -213,7 +213,7 @@ impl SceneWriter<'_> {
             }
         };
         if !is_equal {
-            let text = format!("the filter `{name}` of glimt has another width; edges differ by a pixel");
+            let text = format!("glimt's `{name}` filter has a different width; edges differ by a pixel");
             self.notes.note(&format!("filter `{}`", filter.kind.text), &text, filter.span());
         }
         parameters.check_all_used()?;
@@ -233,8 +233,8 @@ impl SceneWriter<'_> {
         let matrix = still.inverse();
         if !matrix.is_finite() || camera_scale(&matrix).is_none() {
             let error =
-                PbrtError::new(span, "the transform of this camera is not a rotation and a uniform scale");
-            return Err(error.with_help("shears and different scales along the axes are not supported"));
+                PbrtError::new(span, "this camera's transform is singular or has shear or non-uniform scale");
+            return Err(error.with_help("it can combine translation, rotation, reflection and uniform scale"));
         }
         let lens = Lens {
             radius: parameters.float("lensradius", 0.0)?,
@@ -251,8 +251,7 @@ impl SceneWriter<'_> {
         match kind {
             "perspective" | "orthographic" | "spherical" => {}
             "realistic" => {
-                let error =
-                    PbrtError::new(entity.kind.span.clone(), "glimt has no cameras with lens systems");
+                let error = PbrtError::new(entity.kind.span.clone(), "glimt does not simulate lens systems");
                 return Err(error.with_help("use a \"perspective\" camera with `lensradius`"));
             }
             other => {
@@ -273,8 +272,8 @@ impl SceneWriter<'_> {
         self.write_view(matrix, film, &lens, kind, fov, Some(window))
     }
 
-    /// Returns the window [x0, x1, y0, y1] of the whole film on the plane at distance 1 for a field of view of
-    /// 90 degrees.
+    /// Returns the screen window [x0, x1, y0, y1] of the whole film. For a field of view of 90 degrees, it is
+    /// on the plane at distance 1.
     fn screen_window(
         &mut self,
         film: &Film,
@@ -286,7 +285,7 @@ impl SceneWriter<'_> {
         let frame = aspect.unwrap_or(pixels);
         if frame <= 0.0 {
             let span = parameters.span_of("frameaspectratio");
-            return Err(PbrtError::new(span, "`frameaspectratio` must be above 0"));
+            return Err(PbrtError::new(span, "`frameaspectratio` must be greater than 0"));
         }
         let window = match *screen {
             [] if frame > 1.0 => [-frame, frame, -1.0, 1.0],
@@ -294,18 +293,18 @@ impl SceneWriter<'_> {
             [x0, x1, y0, y1] if x1 > x0 && y1 > y0 => [x0, x1, y0, y1],
             _ => {
                 let error = PbrtError::new(parameters.span_of("screenwindow"), "invalid `screenwindow`");
-                return Err(error.with_help("it has four numbers: left, right, bottom and top"));
+                return Err(error.with_help("it needs four numbers: left < right, then bottom < top"));
             }
         };
         let shape = (window[1] - window[0]) / (window[3] - window[2]);
         if (shape / pixels - 1.0).abs() > 1e-3 {
-            let text = "pixels are square, so the window is cut or extended at the sides";
-            self.notes.substitute("pixels that are not square", text, parameters.span.clone());
+            let text = "pixels are square, so the window is cropped or extended at the sides";
+            self.notes.substitute("non-square pixels", text, parameters.span.clone());
         }
         Ok(window)
     }
 
-    /// Writes the keys of the camera with the matrix from the camera to the world.
+    /// Writes the camera's keys. `matrix` transforms from the camera to the world.
     fn write_view(
         &mut self,
         matrix: DMat4,
@@ -324,7 +323,7 @@ impl SceneWriter<'_> {
             _ => [axis(DVec3::Z), axis(DVec3::Y)],
         };
         let position = matrix.w_axis.truncate();
-        // Far from the origin, a short vector would be rounded.
+        // Far from the origin, a short distance between the two points would be lost to rounding.
         let distance = (position.length() * 1e-3).max(1.0);
         self.document.set("position", position);
         self.document.set("look_at", position + forward * distance);
@@ -332,7 +331,7 @@ impl SceneWriter<'_> {
         if !is_mirroring(&matrix) {
             self.document.set("mirror", true);
         }
-        // The part of the window that is rendered.
+        // Compute the height and the center of the rendered part of the window.
         let pixel = DVec2::new((x1 - x0) / film.size[0] as f64, (y1 - y0) / film.size[1] as f64);
         let [left, top, right, bottom] = film.crop.map(|edge| edge as f64);
         let height = (bottom - top) * pixel.y;
@@ -366,8 +365,8 @@ impl SceneWriter<'_> {
     }
 }
 
-/// Returns the scale of a rotation or reflection with a uniform scale. Files list their matrices with few
-/// digits.
+/// Returns the scale factor of a rotation or reflection with a uniform scale. The tolerance is large because
+/// files often contain matrices with few digits.
 fn camera_scale(matrix: &DMat4) -> Option<f64> {
     const TOLERANCE: f64 = 5e-3;
     let linear = linear_part(matrix);
@@ -387,12 +386,14 @@ impl Lens {
     const PINHOLE: Self = Self { radius: 0.0, focus: 1.0 };
 }
 
-/// Reads `pixelbounds` or `cropwindow`.
+/// Reads `pixelbounds` or `cropwindow`. Returns the crop in pixels, as in [`Film::crop`].
 fn read_crop(parameters: &Parameters, [width, height]: [i64; 2]) -> PbrtResult<[i64; 4]> {
     let bounds = parameters.integers("pixelbounds")?;
     let window = match parameters.find("cropwindow") {
         Some(found) if found.kind == ParameterType::Float => found.numbers()?.to_vec(),
-        Some(found) => return Err(PbrtError::new(found.span.clone(), "`cropwindow` must be floats")),
+        Some(found) => {
+            return Err(PbrtError::new(found.span.clone(), "`cropwindow` must have the type float"));
+        }
         None => Vec::new(),
     };
     let clamp = |edge: i64, most: i64| edge.clamp(0, most);
@@ -410,18 +411,21 @@ fn read_crop(parameters: &Parameters, [width, height]: [i64; 2]) -> PbrtResult<[
         }
         _ => {
             let name = if bounds.is_empty() { "cropwindow" } else { "pixelbounds" };
-            let message = format!("`{name}` has four numbers: x0, x1, y0 and y1");
+            let message = format!("`{name}` needs four numbers: x0, x1, y0 and y1");
             return Err(PbrtError::new(parameters.span_of(name), message));
         }
     };
     if crop[0] >= crop[2] || crop[1] >= crop[3] {
         let name = if bounds.is_empty() { "cropwindow" } else { "pixelbounds" };
-        return Err(PbrtError::new(parameters.span_of(name), "nothing of the image is left"));
+        return Err(PbrtError::new(
+            parameters.span_of(name),
+            format!("`{name}` leaves nothing of the image"),
+        ));
     }
     Ok(crop)
 }
 
-/// Returns the time during which the shutter is open.
+/// Returns how long the shutter is open.
 fn exposure_time(parameters: &Parameters) -> PbrtResult<f64> {
     let time = parameters.float("shutterclose", 1.0)? - parameters.float("shutteropen", 0.0)?;
     if time > 0.0 {

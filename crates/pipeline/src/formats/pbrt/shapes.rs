@@ -13,13 +13,14 @@ use crate::math::{DMat4, DVec2, DVec3};
 use crate::scene::nearest::nearest_name;
 use crate::scene::sanitize::escape_and_truncate;
 
-/// Cells along the circumference of a round shape that becomes a mesh.
+/// Number of cells around a round shape that is converted to a mesh.
 const ROUND_CELLS: u32 = 128;
 
-/// Types of shapes.
+/// Shapes of pbrt-v4.
 const SHAPES: [&str; 8] =
     ["sphere", "disk", "cylinder", "trianglemesh", "plymesh", "loopsubdiv", "bilinearmesh", "curve"];
 
+/// Shapes that exist only in pbrt-v3.
 const OLD_SHAPES: [&str; 5] = ["cone", "paraboloid", "hyperboloid", "heightfield", "nurbs"];
 
 /// A shape's material and placement.
@@ -36,12 +37,12 @@ pub(super) struct Placement<'a> {
     pub(super) span: Range<usize>,
 }
 
-/// The round shapes of pbrt, around z in their own coordinates.
+/// A sphere, disk or cylinder around the z axis.
 struct Round {
     radius: f64,
     z: [f64; 2],
     inner_radius: f64,
-    /// Largest azimuth in radians.
+    /// Azimuth at which the surface ends, in radians.
     azimuth: f64,
 }
 
@@ -65,7 +66,7 @@ impl SceneWriter<'_> {
         let matrix = self.still_transform(shape.placed.transform, span.clone());
         if !is_invertible_affine(&matrix) {
             if matrix.is_finite() && matrix.determinant() == 0.0 {
-                self.notes.note("a shape without extent", "skipped", span);
+                self.notes.note("a shape with a singular transform", "skipped", span);
                 return Ok(());
             }
             return Err(PbrtError::new(span, "the transform of this shape is not invertible"));
@@ -87,14 +88,14 @@ impl SceneWriter<'_> {
             LoweredMaterial::Invalid => return Ok(()),
         };
         if has_inside && shape.is_reversed {
-            let text = "the inside of a closed surface is glass";
+            let text = "a closed surface has glass inside, whatever its orientation";
             self.notes.note("`ReverseOrientation` of a dielectric", text, span.clone());
         }
         let placement = Placement {
             material,
             needs_uv,
             emits: properties.emission.is_some(),
-            // All surfaces scatter light on both sides, so their orientation matters only to lights.
+            // All surfaces scatter light on both sides, so their orientation matters only for lights.
             is_reversed: shape.is_reversed && properties.emission.is_some(),
             matrix,
             group,
@@ -109,7 +110,7 @@ impl SceneWriter<'_> {
         entity.parameters.check_all_used()
     }
 
-    /// Interfaces have no surface, so only their names are checked.
+    /// Marks the parameters of a shape without a surface as used, since their values do not matter.
     fn ignore_shape_parameters(&self, parameters: &Parameters) {
         parameters.ignore(&["alpha", "P", "N", "uv", "indices"]);
     }
@@ -165,9 +166,10 @@ impl SceneWriter<'_> {
             let text = format!("{most} levels are used");
             self.notes.note("many levels of `loopsubdiv`", &text, parameters.span_of("levels"));
         }
-        let text = "subdivided with Loop's weights; pbrt's move vertices with few edges by up to 1/8 of an edge more";
+        let text =
+            "Loop's weights are used; pbrt's move vertices with few edges up to 1/8 of an edge farther";
         self.notes.note("the weights of `loopsubdiv`", text, placement.span.clone());
-        // Normals of the control mesh have no effect.
+        // The normals of the control mesh have no effect.
         data.normals.clear();
         data.drop_degenerate_triangles();
         if data.triangles.is_empty() {
@@ -195,15 +197,15 @@ impl SceneWriter<'_> {
             "sphere" => round.z == [-round.radius, round.radius],
             _ => round.inner_radius == 0.0,
         } && round.azimuth >= std::f64::consts::TAU - 1e-6;
-        // The front of a glimt shape is outside, and only spheres have the texture coordinates of pbrt.
+        // glimt's round shapes face outward, and only its spheres can match pbrt's texture coordinates.
         let is_plain = is_whole
             && (!placement.is_reversed || kind == "disk")
             && (kind == "sphere" || !placement.needs_uv);
         if !is_plain {
             let mesh = round_mesh(kind, &round);
             if !is_whole {
-                let text = "a mesh of 128 cells along the circumference is used";
-                self.notes.note(&format!("a part of a `{kind}`"), text, placement.span.clone());
+                let text = "a mesh with 128 cells around the axis is used";
+                self.notes.note(&format!("a partial `{kind}`"), text, placement.span.clone());
             }
             self.write_mesh_data(mesh, kind, placement);
             return Ok(());
@@ -240,7 +242,7 @@ impl SceneWriter<'_> {
             None => {
                 self.document.set("center", DVec3::ZERO);
                 self.document.set("radius", radius);
-                // glimt's spheres have their poles on y, and u starts at −x.
+                // The poles of glimt's spheres are on the y axis, and u starts at −x.
                 let axes = DMat4::from_cols(
                     DVec3::NEG_X.extend(0.0),
                     DVec3::Z.extend(0.0),
@@ -256,7 +258,7 @@ impl SceneWriter<'_> {
 fn unknown_shape(kind: &str, span: Range<usize>) -> Box<PbrtError> {
     let shown = escape_and_truncate(kind, 40);
     if OLD_SHAPES.contains(&kind) {
-        let error = PbrtError::new(span, format!("\"{shown}\" is a shape of pbrt-v3"));
+        let error = PbrtError::new(span, format!("\"{shown}\" is a pbrt-v3 shape"));
         return error.with_help(super::parameters::V3_HELP);
     }
     let error = PbrtError::new(span, format!("unknown shape \"{shown}\""));
@@ -271,7 +273,7 @@ fn vertex_indices<const N: usize>(parameters: &Parameters, vertices: usize) -> P
         return Ok(vec![std::array::from_fn(|index| index as u32)]);
     }
     if let Some(wrong) = indices.iter().find(|index| !(0..vertices as i64).contains(*index)) {
-        let message = format!("vertex {wrong} is out of range: there are {vertices}, numbered from 0");
+        let message = format!("vertex {wrong} is out of range: the mesh has {vertices}, numbered from 0");
         return Err(PbrtError::new(span(), message));
     }
     let (groups, rest) = indices.as_chunks::<N>();
@@ -282,7 +284,7 @@ fn vertex_indices<const N: usize>(parameters: &Parameters, vertices: usize) -> P
     Ok(groups.iter().map(|group| group.map(|index| index as u32)).collect())
 }
 
-/// Reads a list with an entry per vertex, or an empty one.
+/// Checks that a list is empty or has one entry per vertex.
 fn per_vertex<T>(
     parameters: &Parameters,
     name: &'static str,
@@ -296,6 +298,7 @@ fn per_vertex<T>(
     Err(PbrtError::new(parameters.span_of(name), message))
 }
 
+/// Reads a `trianglemesh`, or the control mesh of a `loopsubdiv`.
 fn triangle_mesh(parameters: &Parameters) -> PbrtResult<MeshData> {
     let positions = parameters.point3s("P")?;
     if positions.is_empty() {
@@ -309,9 +312,9 @@ fn triangle_mesh(parameters: &Parameters) -> PbrtResult<MeshData> {
     Ok(MeshData { positions, normals, uvs, triangles })
 }
 
-/// Reads patches with the corners (0, 0), (1, 0), (0, 1) and (1, 1), and splits them into triangles.
+/// Reads a `bilinearmesh` and tessellates its patches, whose corners are (0, 0), (1, 0), (0, 1) and (1, 1).
 fn bilinear_mesh(parameters: &Parameters) -> PbrtResult<MeshData> {
-    /// Cells along the sides of a curved patch.
+    /// Number of cells along each side of a curved patch.
     const CELLS: u32 = 16;
     let positions = parameters.point3s("P")?;
     if positions.is_empty() {
@@ -360,7 +363,7 @@ where
     (a * (1.0 - uv.x) + b * uv.x) * (1.0 - uv.y) + (c * (1.0 - uv.x) + d * uv.x) * uv.y
 }
 
-/// Returns the area of a sphere, a disk or a cylinder, without its transform.
+/// Returns the area of a sphere, disk or cylinder before its transform.
 pub(super) fn round_shape_area(kind: &str, parameters: &Parameters) -> PbrtResult<f64> {
     let Round { radius, z: [low, high], inner_radius, azimuth } = read_round(kind, parameters)?;
     Ok(match kind {
@@ -385,12 +388,12 @@ fn read_round(kind: &str, parameters: &Parameters) -> PbrtResult<Round> {
     };
     let inner_radius = if kind == "disk" { parameters.float("innerradius", 0.0)? } else { 0.0 };
     if azimuth == 0.0 || kind != "disk" && z[0] == z[1] || inner_radius >= radius {
-        return Err(PbrtError::new(parameters.span.clone(), "nothing of this shape is left"));
+        return Err(PbrtError::new(parameters.span.clone(), "these parameters leave nothing of the shape"));
     }
     Ok(Round { radius, z, inner_radius: inner_radius.max(0.0), azimuth })
 }
 
-/// Splits a round shape into triangles, with pbrt's texture coordinates.
+/// Tessellates a round shape, with pbrt's texture coordinates.
 fn round_mesh(kind: &str, round: &Round) -> MeshData {
     let circle = |u: f64| {
         let (sine, cosine) = libm::sincos(u * round.azimuth);

@@ -1,4 +1,4 @@
-//! The graphics state and the statements of a file, collected in order.
+//! The graphics state, and the statements collected from all files.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -9,10 +9,10 @@ use super::parameters::{Parameter, Parameters, Text};
 use crate::formats::foreign::transform::rotation_about_raw_axis;
 use crate::math::{DMat4, DVec3};
 
-/// The current transforms at the start and the end of the motion.
+/// Transforms at the start time and the end time.
 pub(super) type MotionTransform = [DMat4; 2];
 
-/// Color spaces of `rgb` parameters.
+/// Color space of `rgb` parameters.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum ColorSpace {
     /// The primaries of Rec. 709 and sRGB.
@@ -55,7 +55,7 @@ impl ColorSpace {
     }
 }
 
-/// Statements whose defaults `Attribute` can set.
+/// Kinds of statements for which `Attribute` can set default parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum AttributeTarget {
     Shape,
@@ -84,20 +84,20 @@ pub(super) enum MaterialReference {
     Named(Rc<str>),
 }
 
-/// The state that statements change and `AttributeEnd` restores.
+/// State that statements change and `AttributeEnd` restores.
 #[derive(Clone, Debug)]
 pub(super) struct GraphicsState {
     pub(super) transform: MotionTransform,
-    /// Which of the two transforms the statements change.
+    /// Which of the two transforms subsequent statements change.
     pub(super) active: [bool; 2],
     pub(super) is_reversed: bool,
     pub(super) color_space: ColorSpace,
     pub(super) material: MaterialReference,
-    /// Where the material was chosen.
+    /// Span of the statement that set the material.
     pub(super) material_span: Range<usize>,
     /// Index into [`Statements::area_lights`].
     pub(super) area_light: Option<usize>,
-    /// Media inside and outside of shapes.
+    /// Names of the media inside and outside shapes, or empty.
     pub(super) media: [Rc<str>; 2],
     defaults: [Vec<Rc<Parameter>>; 5],
 }
@@ -119,7 +119,7 @@ impl Default for GraphicsState {
 }
 
 impl GraphicsState {
-    /// Multiplies the active transforms by `matrix`, which is applied to points first.
+    /// Multiplies the active transforms by `matrix` on the right, so that it is applied to points first.
     pub(super) fn concat(&mut self, matrix: DMat4) {
         self.change(|transform| transform * matrix);
     }
@@ -134,9 +134,9 @@ impl GraphicsState {
         &self.defaults[target as usize]
     }
 
-    /// Adds the parameters of an `Attribute` statement.
+    /// Adds the parameters of an `Attribute` statement as defaults.
     pub(super) fn add_defaults(&mut self, target: AttributeTarget, parameters: Parameters) -> PbrtResult<()> {
-        /// Maximum number of defaults.
+        /// Maximum number of defaults per target.
         const MAX_DEFAULTS: usize = 1000;
         let span = parameters.span.clone();
         let defaults = &mut self.defaults[target as usize];
@@ -145,11 +145,11 @@ impl GraphicsState {
             return Ok(());
         }
         defaults.clear();
-        Err(PbrtError::new(span, format!("more than {MAX_DEFAULTS} defaults are set by `Attribute`")))
+        Err(PbrtError::new(span, format!("`Attribute` sets more than {MAX_DEFAULTS} defaults")))
     }
 }
 
-/// The matrix of `LookAt`, from the world to the camera, whose x is on the right, y up and z forward.
+/// World-to-camera matrix of `LookAt`. In camera coordinates, x points right, y up and z forward.
 pub(super) fn look_at(numbers: &[f64; 9], span: &Range<usize>) -> PbrtResult<DMat4> {
     let [position, target, up] =
         [0, 3, 6].map(|at| DVec3::new(numbers[at], numbers[at + 1], numbers[at + 2]));
@@ -161,7 +161,9 @@ pub(super) fn look_at(numbers: &[f64; 9], span: &Range<usize>) -> PbrtResult<DMa
     };
     let Some([right, up, forward]) = axes() else {
         let error = PbrtError::new(span.clone(), "this `LookAt` has no direction");
-        return Err(error.with_help("it needs a position, another point, and a vector that is not parallel"));
+        return Err(error.with_help(
+            "it needs two different points, and an up vector that is not parallel to the view direction",
+        ));
     };
     let columns = [right.extend(0.0), up.extend(0.0), forward.extend(0.0), position.extend(1.0)];
     Ok(DMat4::from_cols(columns[0], columns[1], columns[2], columns[3]).inverse())
@@ -185,13 +187,13 @@ pub(super) struct Entity {
 }
 
 impl Entity {
-    /// The place of the statement's first words.
+    /// Span of the directive and the type.
     pub(super) fn span(&self) -> Range<usize> {
         self.parameters.span.clone()
     }
 }
 
-/// An entity with a transform: a camera, a light, a texture.
+/// A camera, light, texture or other entity with a transform.
 #[derive(Clone, Debug)]
 pub(super) struct PlacedEntity {
     pub(super) entity: Entity,
@@ -226,7 +228,7 @@ pub(super) struct ObjectInstance {
 /// The statements of all files.
 #[derive(Debug, Default)]
 pub(super) struct Statements {
-    /// The camera, with the transform from the world to the camera.
+    /// The camera, with the world-to-camera transform.
     pub(super) camera: Option<PlacedEntity>,
     pub(super) film: Option<Entity>,
     pub(super) sampler: Option<Entity>,
@@ -234,7 +236,7 @@ pub(super) struct Statements {
     pub(super) integrator: Option<Entity>,
     pub(super) float_textures: HashMap<String, PlacedEntity>,
     pub(super) spectrum_textures: HashMap<String, PlacedEntity>,
-    /// Unnamed materials. The first is the default.
+    /// Unnamed materials. The first one is pbrt's default material.
     pub(super) materials: Vec<Entity>,
     pub(super) named_materials: HashMap<String, Entity>,
     pub(super) media: HashMap<String, Entity>,
@@ -259,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn color_spaces_keep_white() {
+    fn color_spaces_preserve_white() {
         for (name, space) in ColorSpace::NAMES {
             let white = space.to_rec709(DVec3::ONE);
             assert!((white - DVec3::ONE).abs().max_element() < 2e-4, "{name}: {white}");

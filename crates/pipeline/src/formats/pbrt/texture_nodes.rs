@@ -1,4 +1,4 @@
-//! Resolves textures to expressions of images, checkers and constants.
+//! Resolves named textures to expression trees of images, checkers and constants.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -12,12 +12,12 @@ use crate::math::{DVec2, DVec3};
 use crate::scene::nearest::nearest_name;
 use crate::scene::sanitize::escape_and_truncate;
 
-/// Maximum depth of textures that use textures.
+/// Maximum nesting depth of textures.
 const MAX_DEPTH: usize = 32;
-/// Maximum number of textures that one texture combines. A texture counts once for each use.
+/// Maximum number of nodes in the tree of a texture. A texture counts once for each use.
 const MAX_NODES: usize = 256;
 
-/// Whether a texture is a color or a number. pbrt keeps them apart.
+/// Whether a texture is a color or a number. pbrt has separate namespaces for them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum TextureValue {
     Color(SpectrumUse),
@@ -25,11 +25,11 @@ pub(super) enum TextureValue {
 }
 
 impl TextureValue {
-    /// The value of reflectance textures.
+    /// A color that is a reflectance or transmittance.
     pub(super) const REFLECTANCE: Self = Self::Color(SpectrumUse::Reflectance);
 }
 
-/// Texture coordinates: (u, v) · `scale` + `offset`.
+/// Maps texture coordinates: (u, v) · `scale` + `offset`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct UvMapping {
     pub(super) scale: DVec2,
@@ -40,7 +40,7 @@ impl UvMapping {
     pub(super) const IDENTITY: Self = Self { scale: DVec2::ONE, offset: DVec2::ZERO };
 }
 
-/// Values outside of the image.
+/// How an image continues outside the unit square.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ImageWrap {
     Repeat,
@@ -65,29 +65,29 @@ pub(super) struct ImageNode {
     pub(super) filter: ImageFilter,
     /// Whether 8- and 16-bit values are linear.
     pub(super) is_linear: bool,
-    /// Whether the image is a number: the mean of the channels, or alpha if there is one.
+    /// Whether the texture is a number: alpha if there is an alpha channel, otherwise the channels' mean.
     pub(super) is_number: bool,
-    /// Factor on the values.
+    /// Factor by which the texels are multiplied.
     pub(super) factor: DVec3,
     /// Whether the value is max(0, 1 − factor · texel).
     pub(super) is_inverted: bool,
 }
 
-/// A texture.
+/// A texture, as an expression tree.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum TextureNode {
     Constant(DVec3),
     Image(ImageNode),
-    /// The first is in the cell at the corner (0, 0), and cells are one unit wide.
+    /// A checkerboard of cells one unit wide. The first texture fills the cell at (0, 0).
     Checker(UvMapping, Arc<[Self; 2]>),
     Product(Arc<[Self; 2]>),
-    /// (1 − amount) · first + amount · second.
+    /// First, second and amount: (1 − amount) · first + amount · second.
     Mix(Arc<[Self; 3]>),
-    /// Values at the corners (0, 0), (0, 1), (1, 0) and (1, 1).
+    /// Bilinear interpolation of the values at (0, 0), (0, 1), (1, 0) and (1, 1).
     Bilinear(UvMapping, Arc<[Self; 4]>),
-    /// A power of a number.
+    /// A number raised to a constant power.
     Power(Arc<Self>, f64),
-    /// Gradient noise around a mean, with the number of octaves and a factor.
+    /// Gradient noise from 0 to `factor`.
     Noise {
         octaves: u32,
         factor: f64,
@@ -95,7 +95,7 @@ pub(super) enum TextureNode {
 }
 
 impl TextureNode {
-    /// The value, if it is the same everywhere.
+    /// The value of a constant, or `None` for other textures.
     pub(super) fn as_constant(&self) -> Option<DVec3> {
         match self {
             Self::Constant(value) => Some(*value),
@@ -123,7 +123,7 @@ impl TextureNode {
         }
     }
 
-    /// The textures that this one combines.
+    /// The textures that this one directly combines.
     pub(super) fn parts(&self) -> &[Self] {
         match self {
             Self::Constant(_) | Self::Image(_) | Self::Noise { .. } => &[],
@@ -134,7 +134,7 @@ impl TextureNode {
         }
     }
 
-    /// Number of textures that are combined. A texture counts once for each use.
+    /// Number of nodes in the tree.
     fn node_count(&self) -> usize {
         1 + self.parts().iter().map(Self::node_count).sum::<usize>()
     }
@@ -185,7 +185,7 @@ impl<'a> TextureResolver<'a> {
         Self { statements, colors, known: HashMap::new() }
     }
 
-    /// Reads a parameter that may be a texture. Returns `None` if it is absent.
+    /// Reads a parameter that may be a texture or a constant. Returns `None` if it is absent.
     pub(super) fn parameter(
         &mut self,
         parameters: &Parameters,
@@ -221,7 +221,7 @@ impl<'a> TextureResolver<'a> {
         }
     }
 
-    /// Resolves a texture by its name.
+    /// Resolves a texture by name.
     fn named(
         &mut self,
         name: &Text,
@@ -234,7 +234,7 @@ impl<'a> TextureResolver<'a> {
             return Ok(known.clone());
         }
         if depth > MAX_DEPTH {
-            let message = "this texture uses itself, or too many textures use each other";
+            let message = "this texture uses itself, or textures are nested too deeply";
             return Err(PbrtError::new(name.span.clone(), message));
         }
         let (textures, kind) = match value {
@@ -248,7 +248,7 @@ impl<'a> TextureResolver<'a> {
             return Err(PbrtError::new(name.span.clone(), message).with_suggestion(near));
         };
         let node = self.resolve(texture, value, notes, depth)?;
-        // Without a limit, a texture that others use several times would be evaluated exponentially often.
+        // Each use of a texture duplicates its tree, so the size could grow exponentially with the depth.
         if node.node_count() > MAX_NODES {
             let message = format!("this texture combines more than {MAX_NODES} textures");
             return Err(PbrtError::new(name.span.clone(), message));
@@ -275,7 +275,7 @@ impl<'a> TextureResolver<'a> {
             "constant" => part(self, "value", 1.0)?,
             "scale" => {
                 let tex = part(self, "tex", 1.0)?;
-                // The scale is always a number.
+                // `scale` is a number even in color textures.
                 let space = entity.color_space;
                 let number = TextureValue::Number;
                 let scale = self.parameter_at_depth(parameters, "scale", number, space, notes, depth + 1)?;
@@ -292,14 +292,14 @@ impl<'a> TextureResolver<'a> {
             "directionmix" => {
                 let (first, second) = (part(self, "tex1", 0.0)?, part(self, "tex2", 1.0)?);
                 parameters.ignore(&["dir"]);
-                let text = "the mean of both textures is used";
+                let text = "the mean of the two textures is used";
                 notes.substitute_light("texture `directionmix`", text, entity.span());
                 TextureNode::mix(first, second, TextureNode::Constant(DVec3::splat(0.5)))
             }
             "checkerboard" => {
                 let parts = [part(self, "tex1", 1.0)?, part(self, "tex2", 0.0)?];
                 if parameters.integer("dimension", 2, 2..=3)? == 3 {
-                    let text = "its cells follow the texture coordinates instead of space";
+                    let text = "its cells follow the texture coordinates instead of positions in space";
                     notes.substitute("texture `checkerboard` with 3 dimensions", text, entity.span());
                 }
                 TextureNode::Checker(uv_mapping(texture, notes)?, Arc::new(parts))
@@ -308,7 +308,7 @@ impl<'a> TextureResolver<'a> {
                 let (inside, outside) = (part(self, "inside", 1.0)?, part(self, "outside", 0.0)?);
                 notes.substitute("texture `dots`", "their mean is used", entity.span());
                 uv_mapping(texture, notes)?;
-                // A dot of radius 0.35 is in half of the cells.
+                // Half of the cells contain a dot of radius 0.35.
                 let share = std::f64::consts::PI * 0.35 * 0.35 * 0.5;
                 TextureNode::mix(outside, inside, TextureNode::Constant(DVec3::splat(share)))
             }
@@ -355,7 +355,7 @@ fn unknown_texture(kind: &str, at: &Text) -> Box<PbrtError> {
     PbrtError::new(at.span.clone(), message).with_suggestion(nearest_name(kind, NAMES))
 }
 
-/// Reads the mapping of a texture. Only (u, v) mappings have an equal.
+/// Reads the mapping of a texture. Only (u, v) mappings have an equivalent.
 fn uv_mapping(texture: &PlacedEntity, notes: &mut NoteCollector) -> PbrtResult<UvMapping> {
     let parameters = &texture.entity.parameters;
     let number = |name, default| parameters.float(name, default);
@@ -367,11 +367,7 @@ fn uv_mapping(texture: &PlacedEntity, notes: &mut NoteCollector) -> PbrtResult<U
         None | Some("uv") => Ok(UvMapping { scale, offset }),
         Some(other @ ("spherical" | "cylindrical" | "planar")) => {
             let subject = format!("texture mapping `{other}`");
-            notes.substitute(
-                &subject,
-                "the texture coordinates of the shape are used",
-                texture.entity.span(),
-            );
+            notes.substitute(&subject, "the shape's texture coordinates are used", texture.entity.span());
             Ok(UvMapping { scale, offset })
         }
         Some(other) => {
@@ -416,7 +412,7 @@ fn image_node(
             return Err(PbrtError::new(at, "unknown `wrap`").with_suggestion(near));
         }
     };
-    // Only PNG files obey the encoding.
+    // pbrt ignores `encoding` except for PNG files.
     let is_png = file.text.to_lowercase().ends_with(".png");
     let is_linear = match parameters.string("encoding")?.map(|text| &*text.text) {
         None | Some("sRGB" | "srgb") => false,
@@ -439,7 +435,7 @@ fn image_node(
     })
 }
 
-/// Substitutes the procedural textures in space.
+/// Replaces procedural textures that pbrt evaluates at positions in space.
 fn noise_node(texture: &PlacedEntity, notes: &mut NoteCollector) -> PbrtResult<TextureNode> {
     let (parameters, kind) = (&texture.entity.parameters, &*texture.entity.kind.text);
     let octaves = parameters.integer("octaves", 8, 1..=64)?.min(16) as u32;
@@ -451,6 +447,6 @@ fn noise_node(texture: &PlacedEntity, notes: &mut NoteCollector) -> PbrtResult<T
         notes.substitute(&subject, "its mean color is used", span);
         return Ok(TextureNode::Constant(DVec3::new(0.42, 0.42, 0.45)));
     }
-    notes.substitute(&subject, "glimt's noise is used, which differs in its pattern", span);
+    notes.substitute(&subject, "glimt's noise is used, which has a different pattern", span);
     Ok(TextureNode::Noise { octaves, factor: if kind == "windy" { 1.0 } else { factor } })
 }

@@ -1,4 +1,4 @@
-//! Adds the `[textures]` tables.
+//! Writes the `[textures]` tables.
 
 use std::sync::Arc;
 
@@ -9,18 +9,18 @@ use crate::formats::rounding::shorten_color;
 use crate::math::DVec3;
 use crate::scene::BuiltValue;
 
-/// The values of a texture that are used.
+/// How a texture's values are used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum PbrtTextureUse {
     Color,
     Number,
-    /// Heights, whose factor is a separate key.
+    /// Heights, whose factor is the separate key `bump_scale`.
     Height,
     Normal,
 }
 
 impl SceneWriter<'_> {
-    /// Returns the value of a color key: a color or a reference to a texture.
+    /// Returns the value of a color key: a color or a texture reference.
     pub(super) fn color_value(&mut self, node: &TextureNode) -> BuiltValue {
         let node = &self.without_missing_images(node);
         if let Some(color) = node.as_constant() {
@@ -29,7 +29,7 @@ impl SceneWriter<'_> {
         texture_value(self.texture(node, PbrtTextureUse::Color))
     }
 
-    /// Returns the value of a number key.
+    /// Returns the value of a number key: a number or a texture reference.
     pub(super) fn number_value(&mut self, node: &TextureNode) -> BuiltValue {
         let node = &self.without_missing_images(node);
         if let Some(number) = node.as_constant() {
@@ -39,7 +39,7 @@ impl SceneWriter<'_> {
         BuiltValue::Table(vec![("texture", name.into()), ("channel", "r".into())])
     }
 
-    /// Replaces missing images with gray if they are tolerated.
+    /// Replaces missing images with gray if `--missing note` tolerates them.
     pub(super) fn without_missing_images(&mut self, node: &TextureNode) -> TextureNode {
         if let TextureNode::Image(image) = node
             && self.is_tolerated_missing(&image.file, "image", "gray is used")
@@ -72,7 +72,7 @@ impl SceneWriter<'_> {
         }
     }
 
-    /// Returns the name of the texture's table. Adds the table if it is new.
+    /// Returns the name of a texture's table, adding the table if it is new.
     pub(super) fn texture(&mut self, node: &TextureNode, usage: PbrtTextureUse) -> String {
         let (keys, name) = match node {
             TextureNode::Image(image) if self.is_plain_image(image, usage) => {
@@ -95,7 +95,7 @@ impl SceneWriter<'_> {
         self.add_texture_table(keys, &name)
     }
 
-    /// Adds a table unless an equal one exists, and returns its name.
+    /// Returns the name of the table with these keys, adding the table if it is new.
     pub(super) fn add_texture_table(&mut self, keys: TableEntries, wanted: &str) -> String {
         let identity = format!("{keys:?}");
         if let Some(known) = self.textures.get(&identity) {
@@ -108,7 +108,7 @@ impl SceneWriter<'_> {
         name
     }
 
-    /// Whether glimt reads the image as it is.
+    /// Whether glimt can use the image file directly, without baking.
     fn is_plain_image(&mut self, image: &ImageNode, usage: PbrtTextureUse) -> bool {
         if image.wrap == ImageWrap::Black || image.mapping.scale.min_element() == 0.0 {
             return false;
@@ -141,7 +141,7 @@ impl SceneWriter<'_> {
             PbrtTextureUse::Color | PbrtTextureUse::Number | PbrtTextureUse::Height if image.is_linear => {
                 keys.push(("encoding", "linear".into()));
             }
-            // Numbers are decoded like colors.
+            // pbrt decodes the images of number textures from sRGB, as it does for colors.
             PbrtTextureUse::Number | PbrtTextureUse::Height if is_integer => {
                 keys.push(("encoding", "srgb".into()));
             }
@@ -157,12 +157,12 @@ impl SceneWriter<'_> {
     }
 }
 
-/// Refers to a texture.
+/// Value of a key that references a texture.
 pub(super) fn texture_value(name: String) -> BuiltValue {
     BuiltValue::Table(vec![("texture", name.into())])
 }
 
-/// Whether a file's texels are linear floats.
+/// Whether a file has an extension of a floating-point image format, whose texels are linear.
 pub(super) fn has_float_extension(file: &str) -> bool {
     let file = file.to_lowercase();
     [".exr", ".hdr", ".pfm"].iter().any(|extension| file.ends_with(extension))
@@ -172,7 +172,7 @@ fn file_stem(file: &str) -> String {
     std::path::Path::new(file).file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default()
 }
 
-/// Adds `repeat` and `offset`. `cells` is the number of pbrt's units per repetition.
+/// Adds the keys `repeat` and `offset`. One repetition in glimt spans `cells` units of pbrt's mapping.
 pub(super) fn push_mapping(keys: &mut TableEntries, mapping: UvMapping, cells: f64) {
     let UvMapping { scale, offset } = mapping;
     if scale / cells != crate::math::DVec2::ONE {
@@ -183,7 +183,7 @@ pub(super) fn push_mapping(keys: &mut TableEntries, mapping: UvMapping, cells: f
     }
 }
 
-/// glimt's checkers have two cells per repetition.
+/// Keys of a checker texture, which has two cells per repetition in glimt.
 fn checker_keys(mapping: UvMapping, colors: [DVec3; 2]) -> TableEntries {
     let colors = colors.map(|color| color.max(DVec3::ZERO)).map(shorten_color).to_vec();
     let mut keys: TableEntries =
@@ -192,7 +192,7 @@ fn checker_keys(mapping: UvMapping, colors: [DVec3; 2]) -> TableEntries {
     keys
 }
 
-/// Noise from 0 to `factor`.
+/// Keys of a noise texture with values from 0 to `factor`.
 fn noise_keys(octaves: u32, factor: f64) -> TableEntries {
     let colors = BuiltValue::Array(vec![0.0.into(), factor.abs().into()]);
     vec![("type", "noise".into()), ("colors", colors), ("octaves", f64::from(octaves).into())]

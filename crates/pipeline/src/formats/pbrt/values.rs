@@ -1,11 +1,11 @@
-//! Parses the values of a parameter: one value, or a list in brackets.
+//! Parses the values of a parameter: a single value, or a list in brackets.
 
 use std::ops::Range;
 
 use super::lexer::{Lexer, PbrtError, PbrtResult, Token, TokenKind};
 use crate::scene::sanitize::escape_and_truncate;
 
-/// A string with its place.
+/// A string with its span.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Text {
     pub(super) text: String,
@@ -20,7 +20,7 @@ pub(super) enum Values {
     Flags(Vec<bool>),
 }
 
-/// Parses a finite number.
+/// Parses a number that is finite in single precision.
 pub(super) fn parse_number(token: &Token<'_>) -> PbrtResult<f64> {
     let number = (token.kind == TokenKind::Word).then(|| token.text.parse::<f64>().ok()).flatten();
     match number {
@@ -33,7 +33,7 @@ pub(super) fn parse_number(token: &Token<'_>) -> PbrtResult<f64> {
     }
 }
 
-/// Parses the values that follow a declaration.
+/// Parses the values that follow a declaration. Also returns their span.
 pub(super) fn parse_values(
     declaration: &Range<usize>,
     lexer: &mut Lexer<'_>,
@@ -84,14 +84,14 @@ impl ValueList {
             (Some(_), _, _) => {
                 return Err(PbrtError::new(
                     token.span.clone(),
-                    "the values of a list must have the same type",
+                    "all values in a list must have the same type",
                 ));
             }
         }
         Ok(())
     }
 
-    /// An empty list counts as numbers.
+    /// Returns the values. An empty list becomes a list of numbers.
     fn finish(self) -> Values {
         self.0.unwrap_or_else(|| Values::Numbers(Vec::new()))
     }

@@ -28,12 +28,12 @@ pub struct LobeRayTracingKernel<'a> {
     pub aov: PathAov,
     /// Media at the vertices, or `None` if all vertices are in air.
     pub interior_lists: Option<&'a InteriorListPool>,
-    /// The reflected light to which the light found by the rays is added.
+    /// Reflected light, to which the kernel adds the light found by the rays.
     pub sums: &'a mut LightSums,
 }
 
 impl LobeRayTracingKernel<'_> {
-    /// Traces the rays.
+    /// Traces the rays and adds the light they find to `sums`.
     pub fn trace(self) {
         self.tile.world.geometry.instruction_set().run(self);
     }

@@ -236,8 +236,9 @@ impl DirectLightVertexQueue {
         &self.cones
     }
 
-    /// Samples lights at the packets of a group and traces the shadow rays, for [`Self::complete_reflected_light`].
-    /// `shares_with_paths` is true if continuing paths compete with the light samples.
+    /// Samples lights at the packets of a group and traces the shadow rays. Must be called before
+    /// [`Self::complete_reflected_light`]. `shares_with_paths` is true if continuing paths compete with the
+    /// light samples.
     pub fn sample_group_lights(
         &mut self,
         group: Range<usize>,
@@ -270,9 +271,8 @@ impl DirectLightVertexQueue {
         Ok(())
     }
 
-    /// Completes the reflected light of packet `index` in the group passed to
-    /// [`Self::sample_group_lights`] with the light found by lobe rays, and returns it. `number` is the index
-    /// of the packet in the queue.
+    /// Adds the light found by lobe rays to the reflected light of packet `index` in the group passed to
+    /// [`Self::sample_group_lights`], and returns the sums. `number` is the index of the packet in the queue.
     pub fn complete_reflected_light(
         &mut self,
         (index, number): (usize, usize),
@@ -426,9 +426,9 @@ fn interiors_of_batch<'a>(pool: &'a InteriorListPool, row: &VertexBatch) -> Opti
     (!pool.are_all_air() && row.has_vertex_in_glass()).then_some(pool)
 }
 
-/// Makes all of a vector's elements zero and changes its length.
+/// Resizes a vector and sets all its elements to zero.
 fn resize_with_zeros(sums: &mut Vec<Vec3>, count: usize) {
-    // `Vec::resize` would write the elements one component at a time.
+    // `bytemuck` compiles to `memset`, whereas `Vec::resize` alone writes one component at a time.
     sums.truncate(count);
     bytemuck::fill_zeroes(sums);
     sums.resize(count, Vec3::ZERO);

@@ -38,7 +38,7 @@ pub fn gather_photons(
     tile.world.geometry.instruction_set().run(kernel)
 }
 
-/// The work of [`gather_photons`] for one instruction set.
+/// Kernel of [`gather_photons`].
 struct GatherPhotonsKernel<'a> {
     tile: &'a TileContext<'a>,
     row: &'a VertexBatch,

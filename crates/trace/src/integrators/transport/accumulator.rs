@@ -180,7 +180,7 @@ impl Accumulator<'_> {
     /// Adds direct light at vertices with consecutive slots. The camera must see all of these vertices.
     /// `diffuse` contains the diffuse parts, or nothing if they are not needed.
     pub fn add_direct_to_consecutive_slots(&mut self, first: u32, contributions: &[Vec3], diffuse: &[Vec3]) {
-        // Add the components as one slice, which the compiler vectorizes.
+        // The compiler vectorizes the loop over `f32`, but not a loop over `Vec3`.
         let sums = bytemuck::cast_slice_mut::<Vec3, f32>(&mut self.radiance[first as usize..]);
         for (sum, contribution) in sums.iter_mut().zip(bytemuck::cast_slice::<Vec3, f32>(contributions)) {
             *sum += contribution;

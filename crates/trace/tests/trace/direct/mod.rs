@@ -197,7 +197,7 @@ impl LitScene {
         sums
     }
 
-    /// Adds the light found by lobe rays to the red channel of `sums`.
+    /// Returns the red channel of `sums` plus the light found by lobe rays.
     fn trace_lobe_rays(&self, row: &VertexBatch, sharp: u32, sums: &LightSums) -> [f32; PACKET_SIZE] {
         let (tile, mut sums) = (&self.tile(), sums.clone());
         let (aov, interior_lists) = (PathAov::ALL, None);

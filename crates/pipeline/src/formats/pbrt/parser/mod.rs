@@ -1,4 +1,4 @@
-//! Parses the statements of a pbrt file and the files that it includes.
+//! Parses the statements in a pbrt file and in the files it includes.
 
 mod transforms;
 mod world;
@@ -23,9 +23,9 @@ use crate::scene::sanitize::escape_and_truncate;
 
 /// Maximum number of errors to report.
 const MAX_ERRORS: usize = 50;
-/// Maximum number of files that include each other.
+/// Maximum nesting depth of included files.
 const MAX_INCLUDE_DEPTH: usize = 64;
-/// Maximum number of nested `AttributeBegin` and `ObjectBegin`.
+/// Maximum nesting depth of `AttributeBegin` and `ObjectBegin` blocks.
 const MAX_ATTRIBUTE_DEPTH: usize = 4096;
 
 /// The directives of pbrt-v4.
@@ -75,43 +75,43 @@ const DIRECTIVES: [&str; 43] = [
     "EndTime",
 ];
 
-/// The directives that only pbrt-v3 has.
+/// Directives that exist only in pbrt-v3.
 const OLD_DIRECTIVES: [&str; 5] = ["WorldEnd", "Renderer", "SurfaceIntegrator", "VolumeIntegrator", "Volume"];
 
-/// What an attribute stack entry ends with.
+/// Kinds of blocks, which determine the directive that ends them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum BlockKind {
     Attribute,
     Object,
 }
 
-/// Reads the statements of a file.
+/// Parses a file and the files it includes.
 pub(super) struct Parser<'a> {
     pub(super) sources: &'a mut SourceReader,
     pub(super) errors: Vec<PbrtError>,
     pub(super) statements: Statements,
     token: &'a CancelToken,
-    /// Folder of the first file, to which all paths are relative.
+    /// Folder of the main file, to which all paths are relative.
     folder: PathBuf,
     state: GraphicsState,
     stack: Vec<(GraphicsState, BlockKind, Range<usize>)>,
-    /// Number of blocks that were open before the innermost imported file, which cannot end them.
+    /// Number of blocks that were open before the innermost `Import`. The imported file cannot end them.
     blocks_before_import: usize,
     coordinate_systems: HashMap<String, MotionTransform>,
     is_world: bool,
-    /// The object that is being defined.
+    /// The object being defined.
     object: Option<ObjectDefinition>,
     object_names: HashSet<String>,
     /// Number of shapes and instances.
     shape_count: usize,
-    /// The files being read, from the first to the innermost.
+    /// The files being read, from the main file to the innermost.
     open_files: Vec<PathBuf>,
 }
 
-/// Reads a file and the files that it includes.
+/// Parses a file and the files it includes.
 ///
 /// # Errors
-/// Returns an error if the first file cannot be read. Other errors are in [`Parser::errors`].
+/// Returns an error if the main file cannot be read. Other errors are in [`Parser::errors`].
 pub(super) fn parse<'a>(
     path: &Path,
     sources: &'a mut SourceReader,
@@ -157,7 +157,7 @@ impl Parser<'_> {
         }
     }
 
-    /// Parses the text of a file. Continues after errors. Returns the place of its end.
+    /// Parses the text of a file, continuing after errors. Returns the span of its end.
     fn parse_text(&mut self, text: &Arc<str>, base: usize) -> Result<Range<usize>, AssetError> {
         let mut lexer = Lexer::new(text, base);
         while self.errors.len() < MAX_ERRORS {
@@ -185,7 +185,7 @@ impl Parser<'_> {
         Ok(lexer.end())
     }
 
-    /// Checks that nothing is open at the end.
+    /// Checks for unclosed blocks and a missing `WorldBegin`.
     fn finish(&mut self, end: Range<usize>) {
         if !self.errors.is_empty() {
             return;
@@ -198,11 +198,11 @@ impl Parser<'_> {
             self.report(PbrtError::new(span, format!("this block has no `{name}`")));
         } else if !self.is_world {
             let error = PbrtError::new(end, "the scene has no `WorldBegin`");
-            self.report(error.with_help("the camera and the film precede it, shapes and lights follow"));
+            self.report(error.with_help("put the camera and the film before it, shapes and lights after it"));
         }
     }
 
-    /// Reads the file that a statement names. `is_import` keeps changes of the graphics state inside of it.
+    /// Parses the file that a statement includes. For an `Import`, restores the graphics state afterwards.
     fn include(
         &mut self,
         directive: &Token<'_>,
@@ -220,13 +220,13 @@ impl Parser<'_> {
             return error(format!("{} includes itself", escape_and_truncate(&name.text, 60)));
         }
         if self.open_files.len() >= MAX_INCLUDE_DEPTH {
-            return error(format!("more than {MAX_INCLUDE_DEPTH} files include each other"));
+            return error(format!("included files are nested more than {MAX_INCLUDE_DEPTH} deep"));
         }
         let (text, base) = match self.sources.read(&path, self.token) {
             Ok(read) => read,
             Err(canceled @ AssetError::Canceled(_)) => return Err(canceled),
             Err(unreadable) => {
-                let help = "paths are relative to the folder of the first file, also in included files";
+                let help = "paths are relative to the folder of the main file, even in included files";
                 return Ok(Err(PbrtError::new(name.span.clone(), unreadable.to_string()).with_help(help)));
             }
         };
@@ -291,7 +291,7 @@ impl Parser<'_> {
         }
     }
 
-    /// Reports statements before `WorldBegin` that must follow it.
+    /// Returns an error before `WorldBegin`, for statements that must follow it.
     fn check_world(&self, span: &Range<usize>, name: &str) -> PbrtResult<()> {
         if self.is_world {
             return Ok(());
@@ -299,7 +299,7 @@ impl Parser<'_> {
         Err(PbrtError::new(span.clone(), format!("`{name}` must follow `WorldBegin`")))
     }
 
-    /// Parses a quoted type and parameters.
+    /// Parses a quoted type and parameters, and adds the defaults from `Attribute` statements.
     fn entity(
         &self,
         directive: &Token<'_>,
@@ -336,7 +336,7 @@ impl Parser<'_> {
                 self.statements.camera = Some(self.placed(entity));
             }
             "Film" if entity.kind.text == "image" => {
-                let error = PbrtError::new(entity.kind.span, "\"image\" is a film of pbrt-v3");
+                let error = PbrtError::new(entity.kind.span, "\"image\" is a pbrt-v3 film");
                 return Err(error.with_help(V3_HELP));
             }
             "Film" => self.statements.film = Some(entity),
@@ -350,7 +350,7 @@ impl Parser<'_> {
 
     fn begin_world(&mut self, span: &Range<usize>) -> PbrtResult<()> {
         if self.is_world {
-            return Err(PbrtError::new(span.clone(), "there is already a `WorldBegin`"));
+            return Err(PbrtError::new(span.clone(), "the scene has more than one `WorldBegin`"));
         }
         self.is_world = true;
         self.state.transform = [DMat4::IDENTITY; 2];
@@ -387,7 +387,7 @@ impl Parser<'_> {
         };
         self.check_world(&span, name)?;
         if self.stack.len() >= MAX_ATTRIBUTE_DEPTH {
-            let message = format!("more than {MAX_ATTRIBUTE_DEPTH} blocks are nested");
+            let message = format!("blocks are nested more than {MAX_ATTRIBUTE_DEPTH} deep");
             return Err(PbrtError::new(span, message));
         }
         self.stack.push((self.state.clone(), kind, span));
@@ -419,13 +419,13 @@ impl Parser<'_> {
 fn unknown_directive(name: &str, span: Range<usize>) -> Box<PbrtError> {
     let shown = escape_and_truncate(name, 32);
     if OLD_DIRECTIVES.contains(&name) {
-        return PbrtError::new(span, format!("`{shown}` is a directive of pbrt-v3")).with_help(V3_HELP);
+        return PbrtError::new(span, format!("`{shown}` is a pbrt-v3 directive")).with_help(V3_HELP);
     }
     let error = PbrtError::new(span, format!("unknown directive `{shown}`"));
     error.with_suggestion(nearest_name(name, DIRECTIVES))
 }
 
-/// Skips tokens until a directive follows. Returns whether there is one.
+/// Skips to the next directive. Returns whether there is one.
 fn skip_to_directive(lexer: &mut Lexer<'_>) -> bool {
     let is_directive = |token: &Token<'_>| {
         token.kind == TokenKind::Word && token.text.starts_with(|c: char| c.is_ascii_uppercase())
@@ -442,10 +442,11 @@ fn skip_to_directive(lexer: &mut Lexer<'_>) -> bool {
     }
 }
 
-/// Reads a token, which must be present.
+/// Reads the next token of a statement. Returns an error at the end of the file.
 fn any<'a>(directive: &Token<'_>, lexer: &mut Lexer<'a>) -> PbrtResult<Token<'a>> {
     let missing = || {
-        let message = format!("the file ends within `{}`", escape_and_truncate(&directive.text, 32));
+        let message =
+            format!("the file ends in the middle of `{}`", escape_and_truncate(&directive.text, 32));
         PbrtError::new(directive.span.clone(), message)
     };
     lexer.next()?.ok_or_else(missing)

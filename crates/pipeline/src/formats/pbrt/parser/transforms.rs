@@ -91,7 +91,7 @@ fn numbers<const N: usize>(directive: &Token<'_>, lexer: &mut Lexer<'_>) -> Pbrt
     Ok(values)
 }
 
-/// Reads 16 numbers in brackets, column by column.
+/// Reads a matrix: 16 numbers, column by column.
 fn bracketed_matrix(directive: &Token<'_>, lexer: &mut Lexer<'_>) -> PbrtResult<DMat4> {
     Ok(DMat4::from_cols_array(&numbers(directive, lexer)?))
 }

@@ -1,4 +1,4 @@
-//! Statements of the world: shapes, lights, materials, textures and objects.
+//! Statements that describe the world: shapes, lights, materials, textures and objects.
 
 use std::ops::Range;
 use std::rc::Rc;
@@ -41,7 +41,7 @@ impl Parser<'_> {
                 let entity = self.entity(directive, lexer, AttributeTarget::Material)?;
                 let Text { text: name, span } = entity.kind.clone();
                 if self.statements.named_materials.insert(name, entity).is_some() {
-                    return Err(PbrtError::new(span, "there is already a material of this name"));
+                    return Err(PbrtError::new(span, "there is already a material with this name"));
                 }
             }
             "NamedMaterial" => {
@@ -62,7 +62,7 @@ impl Parser<'_> {
             "float" => &mut self.statements.float_textures,
             "spectrum" => &mut self.statements.spectrum_textures,
             "color" => {
-                let error = PbrtError::new(value.span, "\"color\" textures are of pbrt-v3");
+                let error = PbrtError::new(value.span, "\"color\" textures exist only in pbrt-v3");
                 return Err(error.with_help(V3_HELP));
             }
             _ => {
@@ -71,19 +71,19 @@ impl Parser<'_> {
             }
         };
         if textures.insert(name.text, placed).is_some() {
-            return Err(PbrtError::new(name.span, "there is already a texture of this name"));
+            return Err(PbrtError::new(name.span, "there is already a texture with this name"));
         }
         Ok(())
     }
 
-    /// Counts a shape or an instance.
+    /// Counts a shape or instance. Returns an error if there are too many.
     pub(super) fn count_shape(&mut self, span: &Range<usize>) -> PbrtResult<()> {
         self.shape_count += 1;
         if self.shape_count <= MAX_SHAPES {
             return Ok(());
         }
         let error = PbrtError::new(span.clone(), format!("more than {MAX_SHAPES} shapes and instances"));
-        Err(error.with_help("combine them in meshes"))
+        Err(error.with_help("merge shapes into larger meshes"))
     }
 
     pub(super) fn add_shape(&mut self, entity: Entity) {
@@ -116,7 +116,7 @@ impl Parser<'_> {
             return Err(PbrtError::new(directive.span.clone(), "objects cannot be nested"));
         }
         if !self.object_names.insert(name.text.clone()) {
-            return Err(PbrtError::new(name.span, "there is already an object of this name"));
+            return Err(PbrtError::new(name.span, "there is already an object with this name"));
         }
         self.begin_block(BlockKind::Object, directive.span.clone())?;
         self.object = Some(ObjectDefinition { name, shapes: Vec::new() });

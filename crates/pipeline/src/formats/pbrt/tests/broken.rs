@@ -1,9 +1,9 @@
-//! Errors in broken scenes, with their lines and columns.
+//! Messages and positions of errors in invalid scenes.
 
 use super::*;
 
-/// Broken scenes: the text after the camera and `WorldBegin`, the underlined text, and a part of the message.
-/// `§` marks the start of the underlined text.
+/// Invalid scenes: the text after the camera and `WorldBegin`, and part of the message. `§` marks the start
+/// of the underlined text.
 const WORLDS: [(&str, &str); 37] = [
     ("\n§Shap \"sphere\"", "unknown directive"),
     ("§WorldEnd", "pbrt-v3"),
@@ -12,7 +12,7 @@ const WORLDS: [(&str, &str); 37] = [
     ("Shape §\"cone\"", "pbrt-v3"),
     ("Shape \"sphere\"\n  §\"float raduis\" 2", "unknown parameter"),
     ("Shape \"sphere\" §\"integer radius\" 2", "`radius` must have the type float"),
-    ("Shape \"sphere\" \"float radius\" §-1", "above 0"),
+    ("Shape \"sphere\" \"float radius\" §-1", "greater than 0"),
     ("Shape \"sphere\" \"float radius\" §[1 2]", "one value"),
     ("Shape \"sphere\" §\"color Kd\" [1 1 1]", "unknown parameter type"),
     ("Shape \"sphere\" \"float radius\" [1 §oops]", "expected a number"),
@@ -43,12 +43,12 @@ const WORLDS: [(&str, &str); 37] = [
     ("Rotate 90 0 0 §x", "expected a number"),
     ("§Rotate 90 0 0 0", "no direction"),
     ("Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0] \"integer indices\" §[0 1 3]", "out of range"),
-    ("Shape \"plymesh\" \"string filename\" §\"a.gltf\"", "reads PLY files"),
+    ("Shape \"plymesh\" \"string filename\" §\"a.gltf\"", "can only read PLY files"),
     ("§Camera \"perspective\"", "must precede `WorldBegin`"),
 ];
 
 #[test]
-fn errors_have_the_right_place() {
+fn errors_have_the_right_position() {
     for (marked, message) in WORLDS {
         let text = format!("{CAMERA}WorldBegin\n{marked}");
         check(&text, message);
@@ -56,7 +56,7 @@ fn errors_have_the_right_place() {
 }
 
 #[test]
-fn errors_of_options_have_the_right_place() {
+fn errors_in_options_have_the_right_position() {
     for (marked, message) in [
         ("§Shape \"sphere\"", "must follow `WorldBegin`"),
         ("Film §\"image\"\nWorldBegin", "pbrt-v3"),
@@ -140,7 +140,7 @@ fn cycles_and_deep_nesting_are_errors() {
     folder.write("a.pbrt", b"Include \"b.pbrt\"");
     folder.write("b.pbrt", b"Include \"a.pbrt\"");
     assert!(folder.read().expect_err("errors")[0].message.contains("includes itself"));
-    // Files that include each other twice.
+    // Each file includes the next one twice.
     let folder = SceneFolder::new(&format!("{CAMERA}WorldBegin\nInclude \"0.pbrt\"\n"));
     for depth in 0..100 {
         let next = depth + 1;

@@ -1,8 +1,8 @@
-//! Facts about the format that are easily read wrong.
+//! Rules of the format that are easy to get wrong.
 
 use super::*;
 
-/// Whether `toml` contains all `lines`.
+/// Asserts that `toml` contains all `lines`.
 fn check(toml: &str, lines: &[&str]) {
     for line in lines {
         assert!(toml.contains(line), "{line} is missing:\n{toml}");
@@ -51,7 +51,7 @@ fn field_of_view_is_along_the_shorter_side() {
 }
 
 #[test]
-fn depth_defaults_to_five_scatterings() {
+fn depth_defaults_to_five_bounces() {
     let depth = |integrator: &str| {
         number(&toml_of(&format!("{integrator}{CAMERA}WorldBegin\n{LIGHT}Shape \"sphere\"")), "max_depth")
     };
@@ -91,7 +91,7 @@ fn fronts_of_emissive_meshes_follow_pbrt() {
     let normals = "\"normal N\" [0 0 -1 0 0 -1 0 0 -1]";
     assert_eq!(front("", ""), 1.0);
     assert_eq!(front("ReverseOrientation\n", ""), -1.0);
-    // glimt keeps the front of mirrored shapes, as pbrt does.
+    // Mirroring a shape does not flip its front, in glimt or in pbrt.
     assert_eq!(front("Scale -1 1 1\n", ""), 1.0);
     assert_eq!(front("", normals), -1.0);
     assert_eq!(front("ReverseOrientation\n", normals), 1.0);
@@ -178,7 +178,7 @@ fn iso_and_shutter_become_gain() {
     assert!(!toml_of_world("Shape \"sphere\"").contains("gain"));
 }
 
-/// A 2 × 1 image: gray, 64 and 128.
+/// A gray 2 × 1 image with the values 64 and 128.
 fn gray_pgm() -> Vec<u8> {
     [&b"P5\n2 1\n255\n"[..], &[64, 128]].concat()
 }
@@ -205,14 +205,14 @@ fn checker_cells_are_one_unit() {
 }
 
 #[test]
-fn numbers_of_images_decode_from_srgb() {
+fn number_textures_decode_from_srgb() {
     let texture = "Texture \"t\" \"float\" \"imagemap\" \"string filename\" \"a.pgm\" \"float uscale\" 3\n";
     let toml = toml_with_image(&format!("{texture}Shape \"sphere\" \"texture alpha\" \"t\""));
     check(
         &toml,
         &["encoding = \"srgb\"", "opacity = { texture = \"a\", channel = \"r\" }", "repeat = [3, 1]"],
     );
-    // Roughness is a function of the image, computed in linear values.
+    // The roughness is baked from linear values.
     let world = format!("{texture}Material \"conductor\" \"texture roughness\" \"t\"\nShape \"sphere\"");
     let folder = folder_with_image(&world);
     let scene = folder.read().expect("a scene");
@@ -237,7 +237,7 @@ fn displacement_keeps_its_scale() {
 }
 
 #[test]
-fn inverted_images_are_computed() {
+fn inverted_images_are_baked() {
     let texture =
         "Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"a.pgm\" \"bool invert\" true\n";
     let world = format!("{texture}Material \"diffuse\" \"texture reflectance\" \"t\"\nShape \"sphere\"");
@@ -305,7 +305,7 @@ fn conductors_are_copper_by_default() {
     check(&toml, &["type = \"metal\"", "roughness = 0"]);
     let [red, blue] = [number(&toml, "eta"), number(&toml, "k")];
     assert!((0.1..0.4).contains(&red) && (3.0..4.0).contains(&blue), "{toml}");
-    // A metal under a coat is seen through the coat's index of refraction.
+    // The index of refraction of a coated metal is relative to the coat.
     let coated = toml_of_world(&format!(
         "{LIGHT}Material \"coatedconductor\" \"float interface.eta\" 2\nShape \"sphere\""
     ));
@@ -324,7 +324,7 @@ fn conductor_reflectance_is_exact() {
 }
 
 #[test]
-fn mixes_take_the_second_material_by_amount() {
+fn mix_amount_weights_the_second_material() {
     let world = "MakeNamedMaterial \"a\" \"string type\" \"diffuse\" \"rgb reflectance\" [1 0 0]\n\
         MakeNamedMaterial \"b\" \"string type\" \"diffuse\" \"rgb reflectance\" [0 1 0]\n\
         MakeNamedMaterial \"m\" \"string type\" \"mix\" \"string materials\" [\"a\" \"b\"] \"float amount\" 0.25\n\
@@ -333,8 +333,8 @@ fn mixes_take_the_second_material_by_amount() {
 }
 
 #[test]
-fn spheres_have_the_texture_coordinates_of_pbrt() {
-    // u starts at +x and turns to +y, and v = 1 is at +z.
+fn spheres_have_pbrts_texture_coordinates() {
+    // u starts at +x and increases toward +y, and v = 1 is at +z.
     let texture =
         "Texture \"c\" \"spectrum\" \"checkerboard\"\nMaterial \"diffuse\" \"texture reflectance\" \"c\"\n";
     let toml = toml_of_world(&format!("{LIGHT}{texture}Shape \"sphere\" \"float radius\" 2"));
@@ -353,7 +353,7 @@ fn transforms_are_applied_to_the_right() {
 }
 
 #[test]
-fn clear_media_become_tints() {
+fn absorbing_media_become_tints() {
     let medium = "MakeNamedMedium \"m\" \"string type\" \"homogeneous\" \"rgb sigma_s\" [0 0 0] \"rgb sigma_a\" [0 1 2]\n\
         Material \"dielectric\"\nMediumInterface \"m\" \"\"\nShape \"sphere\"";
     let toml = toml_of_world(&format!("{LIGHT}{medium}"));
@@ -362,7 +362,7 @@ fn clear_media_become_tints() {
     let scene =
         SceneFolder::new(&format!("{CAMERA}WorldBegin\n{LIGHT}{scattering}")).read().expect("a scene");
     assert!(
-        scene.substitutions[0].message.starts_with("the light differs: medium"),
+        scene.substitutions[0].message.starts_with("the lighting changes: medium"),
         "{:?}",
         scene.substitutions
     );
@@ -373,7 +373,7 @@ fn curves_are_skipped_with_a_count() {
     let world = format!("{LIGHT}Shape \"curve\"\nShape \"curve\"\nShape \"sphere\"");
     let scene = SceneFolder::new(&format!("{CAMERA}WorldBegin\n{world}")).read().expect("a scene");
     let messages: Vec<_> = scene.substitutions.iter().map(|one| &*one.message).collect();
-    assert_eq!(messages, ["the light differs: 2 × shape `curve`: skipped"]);
+    assert_eq!(messages, ["the lighting changes: 2 × shape `curve`: skipped"]);
 }
 
 #[test]

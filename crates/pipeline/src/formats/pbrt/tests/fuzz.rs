@@ -1,8 +1,8 @@
-//! Random changes of scenes, which must neither panic nor hang.
+//! Randomly mutates a scene. Reading the result must neither panic nor hang.
 
 use super::*;
 
-/// A scene with most of the features.
+/// A scene that uses most features.
 const SCENE: &str = r#"LookAt 0 0 -5  0 0 0  0 1 0
 Camera "perspective" "float fov" [40] "float lensradius" 0.1 "float focaldistance" 5
 Film "rgb" "integer xresolution" [32] "integer yresolution" [16] "float iso" 150 "float cropwindow" [0 0.5 0 1]
@@ -41,7 +41,7 @@ LightSource "distant" "float illuminance" 3
 LightSource "infinite" "rgb L" [0.1 0.2 0.3]
 "#;
 
-/// A sequence of pseudorandom numbers (Marsaglia's xorshift).
+/// A pseudorandom number generator (Marsaglia's xorshift).
 struct Random(u64);
 
 impl Random {
@@ -53,7 +53,7 @@ impl Random {
     }
 }
 
-/// Changes, removes, doubles or swaps a word.
+/// Returns [`SCENE`] after one to three random mutations, which replace, remove, duplicate or swap words.
 fn mutated(random: &mut Random) -> String {
     const WORDS: [&str; 24] = [
         "[",
@@ -98,14 +98,14 @@ fn mutated(random: &mut Random) -> String {
 }
 
 #[test]
-fn whole_scene_is_read() {
+fn unmutated_scene_is_valid() {
     let folder = SceneFolder::new(SCENE);
     let scene = folder.read().unwrap_or_else(|errors| panic!("{errors:?}"));
     folder.scene_from_document().unwrap_or_else(|errors| panic!("{errors:?}\n{}", scene.document.to_toml()));
 }
 
 #[test]
-fn changed_scenes_are_read_or_refused() {
+fn mutated_scenes_do_not_panic() {
     let count = std::env::var("GLIMT_MUTATIONS").ok().and_then(|count| count.parse().ok()).unwrap_or(300);
     let (mut random, folder) = (Random(0x9e37_79b9_7f4a_7c15), SceneFolder::new(""));
     let mut refused = 0;
@@ -113,6 +113,6 @@ fn changed_scenes_are_read_or_refused() {
         folder.write("scene.pbrt", mutated(&mut random).as_bytes());
         refused += u32::from(folder.scene_from_document().is_err());
     }
-    // Most changes are mistakes, but not all.
+    // Most mutations make the scene invalid, but not all.
     assert!((count / 10..count).contains(&refused), "{refused} of {count}");
 }

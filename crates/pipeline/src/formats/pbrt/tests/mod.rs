@@ -1,4 +1,4 @@
-//! Tests of the reader: small scenes, and the values that they become.
+//! Tests that read small scenes and check the resulting documents and errors.
 
 mod broken;
 mod facts;
@@ -39,7 +39,7 @@ impl SceneFolder {
         self.folder.path().join("scene.pbrt")
     }
 
-    /// Reads the scene. Errors contain the diagnostics.
+    /// Reads the scene. Returns the diagnostics if it has errors.
     pub(super) fn read(&self) -> Result<ForeignScene, Vec<Diagnostic>> {
         read_path(&self.path(), &ForeignOptions::default())
     }
@@ -72,7 +72,7 @@ pub(super) fn toml_of(text: &str) -> String {
     folder.read().expect("a scene").document.to_toml()
 }
 
-/// Options of a scene with a camera.
+/// Options block of a scene, with a camera.
 pub(super) const CAMERA: &str = "LookAt 0 0 -5  0 0 0  0 1 0\nCamera \"perspective\" \"float fov\" 40\n";
 
 /// The generated meshes of a scene.
@@ -84,7 +84,7 @@ pub(super) fn generated_meshes(scene: &ForeignScene) -> Vec<crate::assets::Loade
     files.filter(|(name, _)| name.ends_with(".ply")).map(load).collect()
 }
 
-/// Compresses bytes with gzip, without compression.
+/// Encodes bytes as a gzip file with one stored (uncompressed) block.
 pub(super) fn gzip(bytes: &[u8]) -> Vec<u8> {
     let mut out = vec![0x1f, 0x8b, 8, 0, 0, 0, 0, 0, 0, 255];
     let mut crc = !0_u32;
@@ -104,7 +104,7 @@ pub(super) fn gzip(bytes: &[u8]) -> Vec<u8> {
     out
 }
 
-/// A triangle with the corners (0, 0, 0), (1, 0, 0) and (0, 1, 0) as PLY.
+/// A PLY file of a triangle with the corners (0, 0, 0), (1, 0, 0) and (0, 1, 0).
 pub(super) const TRIANGLE_PLY: &[u8] =
     b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
     element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
