@@ -527,7 +527,7 @@ FAULTS = [
      PBRT_FACTS + "conductors_are_copper_by_default"),
     ("spectra of lights that keep their luminance", "formats/pbrt/colors.rs", "xyz_to_linear_rgb(xyz / ⟦xyz.y⟧)", "1.0",
      PBRT + "colors::tests::emission_has_unit_luminance_unless_rgb"),
-    ("fronts of meshes that ignore the normals", "formats/pbrt/meshes.rs", "⟦self.area_vector(triangle).dot(sum) < 0.0⟧", "is_reversed",
+    ("fronts of meshes that ignore the normals", "formats/foreign/meshes.rs", "⟦self.area_vector(triangle).dot(sum) < 0.0⟧", "is_reversed",
      PBRT_FACTS + "fronts_of_emissive_meshes_follow_pbrt"),
     ("disks that ReverseOrientation does not turn", "formats/pbrt/shapes.rs", "let normal = if ⟦placement.is_reversed⟧ {", "false",
      PBRT_FACTS + "only_reverse_orientation_turns_spheres"),

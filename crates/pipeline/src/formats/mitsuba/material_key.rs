@@ -11,6 +11,8 @@ pub(super) struct MaterialKey {
     pub(super) emitter: Option<ObjectIndex>,
     /// Texture coordinates of the shape. The same for all shapes if the material has no textures.
     pub(super) uv: UvConvention,
+    /// The mesh whose attributes the material uses.
+    pub(super) mesh: Option<usize>,
 }
 
 /// How a shape's texture coordinates in glimt differ from Mitsuba's.

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::graph::{Child, ObjectIndex, ObjectKind, PluginInstance, SceneGraph};
 use super::material_key::MaterialKey;
+use super::mesh_attributes::AttributedMesh;
 use super::plastic::PlasticCoat;
 use super::property::{PropertyValue, SpectrumValue, TransformValue};
 use super::xml::{MAX_ERRORS, shorten};
@@ -79,6 +80,10 @@ pub(super) struct SceneReader<'a> {
     /// Names of the files that an import writes, by source.
     pub(super) asset_names: BTreeMap<PathBuf, String>,
     pub(super) used_asset_names: UsedNames,
+    /// Names of the files that exist only in memory, by their hash.
+    pub(super) generated_names: HashMap<[u8; 32], String>,
+    /// The mesh whose material is being converted, if the material uses its attributes.
+    pub(super) attributes: Option<AttributedMesh>,
     /// Properties reported as unused.
     pub(super) reported_unused: HashSet<ObjectIndex>,
     pub(super) has_environment: bool,
@@ -120,6 +125,8 @@ impl<'a> SceneReader<'a> {
             groups: HashMap::new(),
             asset_names: BTreeMap::new(),
             used_asset_names: UsedNames::default(),
+            generated_names: HashMap::new(),
+            attributes: None,
             reported_unused: HashSet::new(),
             has_environment: false,
             black: None,

@@ -111,9 +111,13 @@ impl<'a> SceneReader<'a> {
                 return self.texture_with_factor(inner, usage, uv, factor * scale);
             }
             "mesh_attribute" | "vertexcolors" | "vertex_color" => {
-                let text = "replaced by its usual value, gray";
-                self.notes.substitute_light(&format!("`{}`", object.plugin), text, object.span.clone());
-                return None;
+                if let Some(found) = self.attribute_keys(object, usage) {
+                    found
+                } else {
+                    let text = "replaced by its usual value, gray";
+                    self.notes.substitute_light(&format!("`{}`", object.plugin), text, object.span.clone());
+                    return None;
+                }
             }
             "gridtexture" | "wireframe" | "curvature" | "volume" => {
                 let text = "replaced by gray";

@@ -106,7 +106,8 @@ impl<'a> SceneReader<'a> {
         let index = bsdf.map(|child| child.target);
         let has_textures = index.into_iter().chain(emitter).any(|index| self.has_textures(index));
         let uv = if has_textures { uv } else { UvConvention::default() };
-        let key = MaterialKey { bsdf: index, emitter, uv };
+        let mesh = self.attributes.as_ref().map(|mesh| mesh.id);
+        let key = MaterialKey { bsdf: index, emitter, uv, mesh };
         if let Some(known) = self.materials.get(&key) {
             return known.clone();
         }
@@ -212,7 +213,8 @@ impl<'a> SceneReader<'a> {
         let context = BsdfContext { depth: context.depth + 1, ..context };
         let built = match object.plugin.as_str() {
             "diffuse" | "lambertian" => {
-                let color = self.reflectance(object, "reflectance", 0.5, context);
+                let color = self.vertex_color_scale(object);
+                let color = color.unwrap_or_else(|| self.reflectance(object, "reflectance", 0.5, context));
                 Some(MaterialBuilder::one_sided("phong", vec![("diffuse", color)]))
             }
             "roughdiffuse" => {
