@@ -38,6 +38,8 @@ NOISE = "materials::texture::noise::tests::"
 STRIPES = "materials::texture::stripes::tests::"
 PLASTIC = "materials::bxdfs::plastic::tests::"
 FACTS = "formats::mitsuba::tests::facts::"
+MITSUBA = "formats::mitsuba::"
+MITSUBA_FEATURES = "formats::mitsuba::tests::features::"
 PRINCIPLED = "materials::bxdfs::principled::tests::"
 COATED = "materials::bxdfs::coated::tests::"
 FROSTED = "closed_forms::frosted::"
@@ -75,6 +77,26 @@ FAULTS = [
      FACTS + "environment_maps_start_at_minus_z"),
     ("mirrored rectangles whose front is reversed", "formats/mitsuba/shapes.rs", "let is_reversed = ⟦is_mirroring(&matrix) != is_flipped⟧;\n        let uv = UvConvention { flips_u: is_reversed", "is_flipped",
      FACTS + "mirrored_rectangles_keep_their_front"),
+    ("attributes of the wrong faces", "formats/mitsuba/mesh_attributes.rs", "DVec2::new((⟦column⟧ + 0.5) / width as f64,", "0.0",
+     MITSUBA_FEATURES + "attributes_of_faces_are_images"),
+    ("disks with square coordinates", "formats/mitsuba/disks.rs", "libm::sin(angle), 0.0) * ⟦uv.x⟧, normal)", "uv.x * uv.x.sqrt()",
+     MITSUBA_FEATURES + "textured_disks_are_polar"),
+    ("radii of curves that are transformed", "formats/mitsuba/curves.rs", "center.extend(⟦radius⟧)", "2.0 * radius",
+     MITSUBA_FEATURES + "curves_are_tubes"),
+    ("splines through their control points", "formats/mitsuba/curves.rs", "⟦3.0 * t3 - 6.0 * t2 + 4.0⟧,", "3.0 * t3 - 6.0 * t2 + 6.0",
+     MITSUBA + "curves::tests::splines_interpolate_lines_and_radii"),
+    ("media whose scale is ignored", "formats/mitsuba/media.rs", "(absorption * ⟦scale⟧)", "1.0",
+     MITSUBA_FEATURES + "absorbing_media_in_glass_are_tints"),
+    ("checkered roughness that is not swapped", "formats/mitsuba/bsdfs/checkered.rs", "⟦colors.reverse();⟧", "",
+     MITSUBA_FEATURES + "checkered_roughness_is_a_blend"),
+    ("projectors without the cosine", "formats/mitsuba/projectors.rs", "(ratio * ⟦libm::sqrt(ratio)⟧)", "1.0",
+     MITSUBA + "projectors::tests::images_are_equalized_by_the_cosine"),
+    ("projectors without π", "formats/mitsuba/projectors.rs", "factor * scale * ⟦PI⟧ *", "1.0",
+     MITSUBA_FEATURES + "projectors_have_a_constant_irradiance"),
+    ("panes of spotlights that are mirrored", "formats/mitsuba/projectors.rs", "self.add_pane_quad(&frame, ⟦[-half, half], [-half, half]⟧", "[half, -half], [-half, half]",
+     MITSUBA_FEATURES + "textured_spots_have_a_pane"),
+    ("gradients of grids in voxels", "formats/mitsuba/sdf_grids.rs", "(gradient(corners, at) * ⟦scale⟧)", "1.0",
+     MITSUBA + "sdf_grids::tests::planes_are_exact_and_face_outward"),
     ("offsets of serialized meshes with 8 bytes in version 3", "assets/mesh/serialized.rs", "let offset_bytes = if ⟦version == 3⟧ { 4 } else { 8 };", "false",
      "assets::mesh::serialized::tests::parts_of_all_versions_are_found"),
     ("panoramas with half the range of elevations", "world/camera.rs", "sin_cos_f64(⟦FRAC_PI_2⟧ * place.y);", "0.5 * FRAC_PI_2",

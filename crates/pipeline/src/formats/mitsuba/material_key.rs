@@ -13,6 +13,8 @@ pub(super) struct MaterialKey {
     pub(super) uv: UvConvention,
     /// The mesh whose attributes the material uses.
     pub(super) mesh: Option<usize>,
+    /// Bits of the transmittance of the medium inside.
+    pub(super) tint: Option<[u64; 3]>,
 }
 
 /// How a shape's texture coordinates in glimt differ from Mitsuba's.

@@ -13,12 +13,15 @@ mod generated;
 mod graph;
 mod instances;
 mod material_key;
+mod media;
 mod mesh_attributes;
 mod placement;
 mod plastic;
 mod ply;
+mod projectors;
 mod property;
 mod reader;
+mod sdf_grids;
 mod settings;
 mod shapes;
 #[cfg(test)]

@@ -84,6 +84,10 @@ pub(super) struct SceneReader<'a> {
     pub(super) generated_names: HashMap<[u8; 32], String>,
     /// The mesh whose material is being converted, if the material uses its attributes.
     pub(super) attributes: Option<AttributedMesh>,
+    /// Transmittance per unit of length of the medium in the shape whose material is being converted.
+    pub(super) interior_tint: Option<DVec3>,
+    /// Position of the camera.
+    pub(super) camera_position: Option<DVec3>,
     /// Properties reported as unused.
     pub(super) reported_unused: HashSet<ObjectIndex>,
     pub(super) has_environment: bool,
@@ -127,6 +131,8 @@ impl<'a> SceneReader<'a> {
             used_asset_names: UsedNames::default(),
             generated_names: HashMap::new(),
             attributes: None,
+            interior_tint: None,
+            camera_position: None,
             reported_unused: HashSet::new(),
             has_environment: false,
             black: None,

@@ -66,11 +66,7 @@ impl<'a> SceneReader<'a> {
             self.error(object.span.clone(), "shapes are nested too deeply", None);
             return false;
         }
-        if let Some(medium) = self.children_of_kind(object, ObjectKind::Medium).next() {
-            let medium = self.object(medium.target);
-            self.refuse(medium, "participating media");
-            return false;
-        }
+        self.interior_tint = self.interior_tint(object);
         if let Some(subsurface) = self.children_of_kind(object, ObjectKind::Subsurface).next() {
             let subsurface = self.object(subsurface.target);
             self.refuse(subsurface, "subsurface scattering");
@@ -91,7 +87,8 @@ impl<'a> SceneReader<'a> {
             "rectangle" => self.add_rectangle(object, target),
             "cube" => self.add_cube(object, target),
             "bsplinecurve" | "linearcurve" => self.add_curves(object, target),
-            "hair" | "sdfgrid" | "heightfield" | "ellipsoids" | "ellipsoidsmesh" | "deformable" => {
+            "sdfgrid" => self.add_distance_grid(object, target),
+            "hair" | "heightfield" | "ellipsoids" | "ellipsoidsmesh" | "deformable" => {
                 self.refuse(object, "this kind of shape");
                 false
             }
@@ -100,6 +97,7 @@ impl<'a> SceneReader<'a> {
                 false
             }
         };
+        self.interior_tint = None;
         self.report_unused(index);
         is_added
     }

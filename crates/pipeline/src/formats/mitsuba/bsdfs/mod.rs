@@ -1,5 +1,6 @@
 //! Converts BSDFs to materials.
 
+mod checkered;
 mod nested;
 mod surfaces;
 
@@ -107,7 +108,8 @@ impl<'a> SceneReader<'a> {
         let has_textures = index.into_iter().chain(emitter).any(|index| self.has_textures(index));
         let uv = if has_textures { uv } else { UvConvention::default() };
         let mesh = self.attributes.as_ref().map(|mesh| mesh.id);
-        let key = MaterialKey { bsdf: index, emitter, uv, mesh };
+        let tint = self.interior_tint.map(|tint| tint.to_array().map(f64::to_bits));
+        let key = MaterialKey { bsdf: index, emitter, uv, mesh, tint };
         if let Some(known) = self.materials.get(&key) {
             return known.clone();
         }

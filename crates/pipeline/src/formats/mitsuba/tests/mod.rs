@@ -2,6 +2,7 @@
 
 mod broken;
 mod facts;
+mod features;
 mod fuzz;
 
 use std::path::{Path, PathBuf};
