@@ -69,6 +69,22 @@ impl MeshData {
         self.triangles = triangles;
     }
 
+    /// Drops triangles that single precision cannot tell from a line.
+    pub(crate) fn drop_slivers(&mut self) {
+        let [low, high] = self
+            .positions
+            .iter()
+            .fold([DVec3::MAX, DVec3::MIN], |[low, high], at| [low.min(*at), high.max(*at)]);
+        let least = 2e-7 * (high - low).max_element();
+        let mut triangles = std::mem::take(&mut self.triangles);
+        triangles.retain(|triangle| {
+            let [a, b, c] = triangle.map(|vertex| self.positions[vertex as usize]);
+            let longest = (b - a).length().max((c - b).length()).max((a - c).length());
+            self.area_vector(*triangle).length() > least * longest
+        });
+        self.triangles = triangles;
+    }
+
     /// Gives every triangle the texture coordinates (0, 0), (1, 0) and (1, 1), the default of pbrt.
     pub(crate) fn add_default_uvs(&mut self) {
         if !self.uvs.is_empty() {
@@ -227,6 +243,15 @@ mod tests {
         let mesh = MeshData::from_surface([3, 2], |uv| (DVec3::new(uv.x, uv.y, 0.0), DVec3::Z));
         assert_eq!((mesh.positions.len(), mesh.triangles.len()), (12, 12));
         assert!(mesh.triangles.iter().all(|triangle| mesh.area_vector(*triangle).z > 0.0));
+    }
+
+    #[test]
+    fn slivers_are_dropped() {
+        let mut mesh = triangle();
+        mesh.positions.push(DVec3::X * 0.5 + DVec3::Y * 1e-8);
+        mesh.triangles.push([0, 1, 3]);
+        mesh.drop_slivers();
+        assert_eq!(mesh.triangles, [[0, 1, 2]]);
     }
 
     #[test]

@@ -41,7 +41,7 @@ impl<'a> SceneReader<'a> {
         material: String,
         matrix: &DMat4,
     ) -> bool {
-        mesh.drop_degenerate_triangles();
+        mesh.drop_slivers();
         if mesh.triangles.is_empty() {
             self.notes.note("a mesh without area", "left out", object.span.clone());
             return false;

@@ -3,8 +3,10 @@
 //! Attributes of faces become an image with one texel per face, and texture coordinates that point to it.
 //! Colors of vertices become glimt's vertex colors.
 
+use std::path::Path;
+
 use super::graph::{ObjectIndex, ObjectKind, PluginInstance};
-use super::ply::{MeshAttribute, PlyTables};
+use super::ply::{AttributedMesh, MeshAttribute, PlyTables};
 use super::reader::SceneReader;
 use super::shapes::ShapeTarget;
 use super::textures::{MitsubaTextureUse, extension};
@@ -13,22 +15,11 @@ use crate::formats::foreign::meshes::MeshData;
 use crate::formats::foreign::pixels::Pixels;
 use crate::math::{DMat4, DVec2, DVec3, Vec3};
 use crate::scene::BuiltValue;
-use std::path::Path;
 
 /// Maximum size of a file with attributes.
 const MAX_BYTES: u64 = 1 << 30;
 /// Maximum number of faces of a mesh with attributes of faces.
 const MAX_FACES: usize = 1 << 22;
-
-/// The mesh whose material is being converted, and its attributes.
-#[derive(Debug)]
-pub(super) struct AttributedMesh {
-    /// Start of the shape in the text, which identifies it.
-    pub(super) id: usize,
-    tables: PlyTables,
-    /// Colors of the vertices, if the material multiplies them.
-    colors: Vec<DVec3>,
-}
 
 /// How a material uses the attributes of its mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -11,6 +11,16 @@ pub(super) struct PlyTables {
     triangles: Vec<[u32; 3]>,
 }
 
+/// The mesh whose material is being converted, and its attributes.
+#[derive(Debug)]
+pub(super) struct AttributedMesh {
+    /// Start of the shape in the text, which identifies it.
+    pub(super) id: usize,
+    pub(super) tables: PlyTables,
+    /// Colors of the vertices, if the material multiplies them.
+    pub(super) colors: Vec<DVec3>,
+}
+
 /// The scalar properties of an element, row by row.
 #[derive(Debug, Default, PartialEq)]
 struct PropertyTable {

@@ -228,7 +228,7 @@ impl<'a> SceneReader<'a> {
         let scale = self.float(object, "scale").unwrap_or(1.0).max(0.0);
         let ProjectedImage { pixels, factor } = equalize(&image, half);
         let secant = libm::sqrt(1.0 + half.length_squared());
-        let intensity = factor * scale * PI * secant.powi(3);
+        let intensity = factor * scale * PI * (secant * secant * secant);
         let file = self.add_generated_file("projection", "pfm", pixels.encode_pfm(false));
         let texture = self.texture_names.make_unique("projection", "texture");
         self.document.start_named_table("textures", &texture);

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 use super::graph::{Child, ObjectIndex, ObjectKind, PluginInstance, SceneGraph};
 use super::material_key::MaterialKey;
-use super::mesh_attributes::AttributedMesh;
 use super::plastic::PlasticCoat;
+use super::ply::AttributedMesh;
 use super::property::{PropertyValue, SpectrumValue, TransformValue};
 use super::xml::{MAX_ERRORS, shorten};
 use crate::assets::Companion;

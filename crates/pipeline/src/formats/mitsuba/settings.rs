@@ -18,7 +18,7 @@ const FILM_DIAGONAL: f64 = 43.266_615_305_567_87;
 const UNLIMITED_DEPTH: f64 = 1000.0;
 
 /// Integrators that solve the whole rendering equation.
-const PATH_INTEGRATORS: [&str; 22] = [
+const PATH_INTEGRATORS: [&str; 21] = [
     "path",
     "volpath",
     "volpathmis",
@@ -33,7 +33,6 @@ const PATH_INTEGRATORS: [&str; 22] = [
     "prbvolpath",
     "prb_basic",
     "prb_projective",
-    "direct_projective",
     "emission_projective",
     "projective_path",
     "pathsimple",
@@ -271,7 +270,9 @@ impl<'a> SceneReader<'a> {
             return;
         };
         self.document.set_span_for_next_values(integrator.span.clone());
-        let depth = self.integer(integrator, "max_depth").unwrap_or(-1);
+        // Mitsuba's differentiable path tracers stop after 6 segments by default.
+        let default_depth = if integrator.plugin.starts_with("prb") { 6 } else { -1 };
+        let depth = self.integer(integrator, "max_depth").unwrap_or(default_depth);
         let depth = if depth < 0 { UNLIMITED_DEPTH } else { (depth - 1).clamp(0, 10_000) as f64 };
         let plugin = integrator.plugin.as_str();
         if self.boolean(integrator, "hide_emitters", false) {
@@ -279,7 +280,7 @@ impl<'a> SceneReader<'a> {
             self.notes.substitute("`hide_emitters`", text, integrator.span.clone());
         }
         match plugin {
-            "direct" => {
+            "direct" | "direct_projective" => {
                 for name in ["emitter_samples", "shading_samples", "bsdf_samples"] {
                     let count = self.integer(integrator, name);
                     if name != "bsdf_samples" && count.is_some_and(|count| count > 1) {

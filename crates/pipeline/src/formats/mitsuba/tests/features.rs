@@ -283,3 +283,11 @@ fn rotations_by_nothing_need_no_axis() {
     let turned = r#"<transform name="to_world"><rotate x="0" y="0" z="0" angle="0"/></transform>"#;
     lacks(&scene(&format!(r#"<shape type="cube">{turned}</shape>"#)).toml(), "matrix");
 }
+
+#[test]
+fn differentiable_integrators_have_limits() {
+    for (plugin, depth) in [("path", 1000.0), ("prb", 5.0), ("direct_projective", 1.0)] {
+        let text = scene(&format!("<integrator type=\"{plugin}\"/>")).toml();
+        assert_eq!(numbers(&text, "max_depth"), [depth], "{plugin}");
+    }
+}
