@@ -20,7 +20,7 @@ fn strict_import_rejects_only_substitutions() {
     let substitution = mitsuba("path", r#"<boolean name="hide_emitters" value="true"/>"#);
     let spot = "Camera \"perspective\"\nWorldBegin\nLightSource \"spot\"\n\
         Translate 0 0 5\nShape \"sphere\"\n";
-    for (file, text, word) in [("a.xml", note.as_str(), "once per emitter sample"), ("b.pbrt", spot, "spot")]
+    for (file, text, word) in [("a.xml", note.as_str(), "several emitter samples"), ("b.pbrt", spot, "spot")]
     {
         let dir = TestDir::new();
         dir.write(file, text);
