@@ -87,6 +87,8 @@ FAULTS = [
      MITSUBA_FEATURES + "curves_are_tubes"),
     ("splines through their control points", "formats/mitsuba/curves.rs", "⟦3.0 * t3 - 6.0 * t2 + 4.0⟧,", "3.0 * t3 - 6.0 * t2 + 6.0",
      MITSUBA + "curves::tests::splines_interpolate_lines_and_radii"),
+    ("joints of linear curves with two spheres", "formats/mitsuba/curves.rs", "if !is_spline && ⟦number > 0⟧ {", "false",
+     MITSUBA + "curves::tests::joints_belong_to_the_previous_segment"),
     ("media whose scale is ignored", "formats/mitsuba/media.rs", "(absorption * ⟦scale⟧)", "1.0",
      MITSUBA_FEATURES + "absorbing_media_in_glass_are_tints"),
     ("checkered roughness that is not swapped", "formats/mitsuba/bsdfs/checkered.rs", "⟦colors.reverse()⟧;", "()",

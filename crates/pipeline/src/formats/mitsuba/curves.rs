@@ -138,13 +138,18 @@ fn tubes(curves: &[Vec<ControlPoint>], is_spline: bool) -> Option<MeshData> {
     }
     let segments: usize = curves.iter().map(|curve| curve.len() + 1 - points).sum();
     let mut tubes = MeshData::default();
-    let windows = curves.iter().flat_map(|curve| curve.windows(points));
-    for (index, window) in windows.enumerate() {
+    let windows = curves.iter().flat_map(|curve| curve.windows(points).enumerate());
+    for (index, (number, window)) in windows.enumerate() {
         let mut segment = match *window {
             [a, b, c, d] => spline_segment(&[a, b, c, d]),
             [a, b] => linear_segment([a, b]),
             _ => return None,
         };
+        if !is_spline && number > 0 {
+            // The previous segment ends with this sphere.
+            let is_start = |vertex: u32| linear_part(segment.uvs[vertex as usize].y) == 0.0;
+            segment.triangles.retain(|triangle| !triangle.iter().all(|vertex| is_start(*vertex)));
+        }
         let along = |v: f64| (index as f64 + if is_spline { v } else { linear_part(v) }) / segments as f64;
         segment.uvs.iter_mut().for_each(|uv| *uv = DVec2::new(uv.x, along(uv.y)));
         tubes.append(segment);
@@ -230,6 +235,17 @@ mod tests {
         for row in [first, first + SIDES as usize + 1] {
             assert!((mesh.normals[row].z - 0.125).abs() < 1e-3, "{}", mesh.normals[row]);
         }
+    }
+
+    #[test]
+    fn joints_belong_to_the_previous_segment() {
+        let points = [0.0, 1.0, 3.0].map(|x| DVec4::new(x, 0.0, 0.0, 0.25));
+        let one = linear_segment([points[0], points[1]]);
+        let is_start = |vertex: &u32| one.uvs[*vertex as usize].y < 0.5;
+        let cap = one.triangles.iter().filter(|triangle| triangle.iter().all(is_start)).count();
+        assert!(cap > 0);
+        let both = tubes(&[points.to_vec()], false).expect("a mesh");
+        assert_eq!(both.triangles.len(), 2 * one.triangles.len() - cap);
     }
 
     #[test]
