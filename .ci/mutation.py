@@ -38,6 +38,8 @@ NOISE = "materials::texture::noise::tests::"
 STRIPES = "materials::texture::stripes::tests::"
 PLASTIC = "materials::bxdfs::plastic::tests::"
 FACTS = "formats::mitsuba::tests::facts::"
+MITSUBA = "formats::mitsuba::"
+MITSUBA_FEATURES = "formats::mitsuba::tests::features::"
 PRINCIPLED = "materials::bxdfs::principled::tests::"
 COATED = "materials::bxdfs::coated::tests::"
 FROSTED = "closed_forms::frosted::"
@@ -61,6 +63,8 @@ FAULTS = [
      FACTS + "field_of_view_is_along_x"),
     ("depth limits that are not converted", "formats/mitsuba/settings.rs", "(⟦depth - 1⟧).clamp(0, 10_000)", "depth",
      FACTS + "depth_limits_count_vertices"),
+    ("differentiable path tracers without a limit", "formats/mitsuba/settings.rs", "starts_with(\"prb\") { ⟦6⟧ }", "-1",
+     MITSUBA_FEATURES + "differentiable_integrators_have_limits"),
     ("images that are not flipped", "formats/mitsuba/textures.rs", "return Self { rows: [first, ⟦flipped⟧], offset", "second",
      FACTS + "images_start_at_the_top_row"),
     ("checkerboards that are not swapped", "formats/mitsuba/textures.rs", "TextureUse::Number => ⟦colors.reverse()⟧,", "{}",
@@ -75,6 +79,28 @@ FAULTS = [
      FACTS + "environment_maps_start_at_minus_z"),
     ("mirrored rectangles whose front is reversed", "formats/mitsuba/shapes.rs", "let is_reversed = ⟦is_mirroring(&matrix) != is_flipped⟧;\n        let uv = UvConvention { flips_u: is_reversed", "is_flipped",
      FACTS + "mirrored_rectangles_keep_their_front"),
+    ("attributes of the wrong faces", "formats/mitsuba/mesh_attributes.rs", "DVec2::new((⟦column⟧ + 0.5) / width as f64,", "0.0",
+     MITSUBA_FEATURES + "attributes_of_faces_are_images"),
+    ("disks whose angle is reversed", "formats/mitsuba/disks.rs", "let angle = TAU * ⟦uv.y⟧;", "(1.0 - uv.y)",
+     MITSUBA + "disks::tests::coordinates_are_radius_and_angle"),
+    ("radii of curves that are transformed", "formats/mitsuba/curves.rs", "center.extend(⟦radius⟧)", "2.0 * radius",
+     MITSUBA_FEATURES + "curves_are_tubes"),
+    ("splines through their control points", "formats/mitsuba/curves.rs", "⟦3.0 * t3 - 6.0 * t2 + 4.0⟧,", "3.0 * t3 - 6.0 * t2 + 6.0",
+     MITSUBA + "curves::tests::splines_interpolate_lines_and_radii"),
+    ("joints of linear curves with two spheres", "formats/mitsuba/curves.rs", "if !is_spline && ⟦number > 0⟧ {", "false",
+     MITSUBA + "curves::tests::joints_belong_to_the_previous_segment"),
+    ("media whose scale is ignored", "formats/mitsuba/media.rs", "(absorption * ⟦scale⟧)", "1.0",
+     MITSUBA_FEATURES + "absorbing_media_in_glass_are_tints"),
+    ("checkered roughness that is not swapped", "formats/mitsuba/bsdfs/checkered.rs", "⟦colors.reverse()⟧;", "()",
+     MITSUBA_FEATURES + "checkered_roughness_is_a_blend"),
+    ("projectors without the cosine", "formats/mitsuba/projectors.rs", "(ratio * ⟦libm::sqrt(ratio)⟧)", "1.0",
+     MITSUBA + "projectors::tests::images_are_equalized_by_the_cosine"),
+    ("projectors without π", "formats/mitsuba/projectors.rs", "factor * scale * ⟦PI⟧ *", "1.0",
+     MITSUBA_FEATURES + "projectors_have_a_constant_irradiance"),
+    ("panes of spotlights that are mirrored", "formats/mitsuba/projectors.rs", "self.add_pane_quad(&frame, ⟦[-half, half]⟧, [-half, half]", "[half, -half]",
+     MITSUBA_FEATURES + "textured_spots_have_a_pane"),
+    ("gradients of grids in voxels", "formats/mitsuba/sdf_grids.rs", "(gradient(corners, at) * ⟦scale⟧)", "DVec3::ONE",
+     MITSUBA + "sdf_grids::tests::planes_are_exact_and_face_outward"),
     ("offsets of serialized meshes with 8 bytes in version 3", "assets/mesh/serialized.rs", "let offset_bytes = if ⟦version == 3⟧ { 4 } else { 8 };", "false",
      "assets::mesh::serialized::tests::all_versions_support_parts"),
     ("panoramas with half the range of elevations", "world/camera.rs", "sin_cos_f64(⟦FRAC_PI_2⟧ * place.y);", "0.5 * FRAC_PI_2",
@@ -527,7 +553,7 @@ FAULTS = [
      PBRT_FACTS + "conductors_are_copper_by_default"),
     ("spectra of lights that keep their luminance", "formats/pbrt/colors.rs", "xyz_to_linear_rgb(xyz / ⟦xyz.y⟧)", "1.0",
      PBRT + "colors::tests::emission_has_unit_luminance_unless_rgb"),
-    ("fronts of meshes that ignore the normals", "formats/pbrt/meshes.rs", "⟦self.area_vector(triangle).dot(sum) < 0.0⟧", "is_reversed",
+    ("fronts of meshes that ignore the normals", "formats/foreign/meshes.rs", "⟦self.area_vector(triangle).dot(sum) < 0.0⟧", "is_reversed",
      PBRT_FACTS + "fronts_of_emissive_meshes_follow_pbrt"),
     ("disks that ReverseOrientation does not turn", "formats/pbrt/shapes.rs", "let normal = if ⟦placement.is_reversed⟧ {", "false",
      PBRT_FACTS + "only_reverse_orientation_turns_spheres"),

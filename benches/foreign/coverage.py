@@ -8,9 +8,11 @@ Each scene is checked twice, with and without --strict. The result is one of
     notes          opens, with notes about features that glimt defines differently
     substitution   opens, but features without an equivalent are replaced
     incomplete     an asset is missing
+    parameter      a parameter has no value in the file (set it with -D)
     refused        any other error
 
-followed by the reasons. Files that are only parts of scenes are skipped, as are XML files that are not Mitsuba scenes.
+followed by the reasons. Files without a sensor and files that other files include are only parts of scenes and are skipped, as are XML
+files that are not Mitsuba scenes. The last line counts the complete files: all except incomplete ones and those without a parameter.
 """
 
 import argparse
@@ -22,6 +24,8 @@ from collections import Counter
 from pathlib import Path
 
 MISSING = re.compile(r"not found|Git LFS pointer|cannot read|no such file", re.IGNORECASE)
+UNDEFINED = re.compile(r"undefined parameter")
+INCLUDE = re.compile(r"<include[^>]*filename\s*=\s*[\"']([^\"']+)")
 
 
 def is_whole_scene(path, seen=()):
@@ -34,11 +38,21 @@ def is_whole_scene(path, seen=()):
         return False
     if re.search(r"<(sensor|camera)\b", text):
         return True
-    for name in re.findall(r"<include[^>]*filename\s*=\s*[\"']([^\"']+)", text):
+    for name in INCLUDE.findall(text):
         inner = path.parent / name
         if inner.is_file() and inner not in seen and is_whole_scene(inner, (*seen, path)):
             return True
     return False
+
+
+def included_files(files):
+    """Returns the XML files that other files include."""
+    included = set()
+    for path in files:
+        if path.suffix == ".xml":
+            for name in INCLUDE.findall(path.read_text(encoding="utf-8", errors="replace")):
+                included.add((path.parent / name).resolve())
+    return included
 
 
 def check(glimt, path, options):
@@ -60,6 +74,8 @@ def classify(glimt, path, options):
     code, found = check(glimt, path, options)
     errors = [one["message"] for one in found if one["severity"] == "error"]
     if code != 0:
+        if errors and all(UNDEFINED.search(one) for one in errors):
+            return "parameter", errors[0]
         missing = [one for one in errors if MISSING.search(one)]
         others = [one for one in errors if not MISSING.search(one)]
         return ("incomplete", missing[0]) if missing and not others else ("refused", (others or ["no reason"])[0])
@@ -82,8 +98,9 @@ def main():
     for folder in arguments.folders:
         counts = Counter()
         files = [folder] if folder.is_file() else sorted([*folder.rglob("*.xml"), *folder.rglob("*.pbrt")])
+        included = included_files(files)
         for path in files:
-            if not is_whole_scene(path):
+            if path.resolve() in included or not is_whole_scene(path):
                 continue
             result, reason = classify(arguments.glimt, path, options)
             counts[result] += 1
@@ -92,6 +109,9 @@ def main():
         print(f"{folder}: {sum(counts.values())} files: {dict(counts)}", flush=True)
         totals += counts
     print(f"total: {sum(totals.values())} files: {dict(totals)}")
+    complete = sum(totals.values()) - totals["incomplete"] - totals["parameter"]
+    plain = totals["opens"] + totals["notes"]
+    print(f"complete: {complete} files, of which {plain} ({plain / max(complete, 1):.1%}) open without a substitution")
     return 0
 
 

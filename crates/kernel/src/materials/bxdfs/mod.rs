@@ -286,16 +286,8 @@ macro_rules! kinds {
             #[inline(always)]
             pub fn copy_lane(&mut self, i: usize, other: &Self, from: usize) {
                 match self {
-                    $(Self::$kind(row) => {
-                        if let Self::$kind(other) = other {
-                            row.copy_lane(i, other, from);
-                        }
-                    })+
-                    $(Self::$part(row) => {
-                        if let Self::$part(other) = other {
-                            row.copy_lane(i, other, from);
-                        }
-                    })+
+                    $(Self::$kind(row) => if let Self::$kind(other) = other { row.copy_lane(i, other, from) },)+
+                    $(Self::$part(row) => if let Self::$part(other) = other { row.copy_lane(i, other, from) },)+
                 }
             }
 

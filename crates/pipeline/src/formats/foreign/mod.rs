@@ -3,8 +3,10 @@
 mod cie;
 pub(crate) mod import;
 pub(crate) mod ior;
+pub(crate) mod meshes;
 pub(crate) mod notes;
 pub(crate) mod options;
+pub(crate) mod pixels;
 pub(crate) mod sources;
 pub(crate) mod spectra;
 pub(crate) mod transform;

@@ -1,5 +1,6 @@
 //! Finds the meshes and images of a scene.
 
+use std::io::Read;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -7,7 +8,7 @@ use super::reader::SceneReader;
 use super::xml::shorten;
 use crate::assets::Companion;
 use crate::formats::foreign::options::MissingAssetMode;
-use crate::system::file::FileStamp;
+use crate::system::file::{FileStamp, open_regular_file};
 
 impl SceneReader<'_> {
     /// Searches for a file. Watches the places before the one where it is found, or all of them if it does not
@@ -52,6 +53,19 @@ impl SceneReader<'_> {
         let found = inspect(self);
         self.inspected_files.insert(key, found);
         found
+    }
+
+    /// Reads and watches a file of at most `limit` bytes to which the document does not refer. Returns `None`
+    /// if it is not readable.
+    pub(super) fn read_watched_file(&mut self, path: &Path, limit: u64) -> Option<Vec<u8>> {
+        let stamp = FileStamp::from_path(path);
+        let mut bytes = Vec::new();
+        let opened = open_regular_file(path).ok().and_then(Result::ok);
+        let read = opened.and_then(|(file, _)| file.take(limit + 1).read_to_end(&mut bytes).ok());
+        let is_read = read.is_some() && bytes.len() as u64 <= limit;
+        let hash = is_read.then(|| *blake3::hash(&bytes).as_bytes());
+        self.companions.push(Companion { path: path.to_owned(), hash, stamp });
+        is_read.then_some(bytes)
     }
 
     /// Returns the name by which the document refers to an asset. Reports an error if the file does not

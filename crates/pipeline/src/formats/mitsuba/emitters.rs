@@ -51,7 +51,7 @@ impl<'a> SceneReader<'a> {
             "constant" => self.add_constant_environment(object),
             "envmap" => self.add_environment_map(object),
             "sunsky" | "sky" | "sun" | "timed_sunsky" => self.add_sky(object),
-            "projector" => self.refuse(object, "projectors"),
+            "projector" => self.add_projector(object),
             "directionalarea" | "collimated" => self.refuse(object, "collimated light"),
             _ => self.unknown_plugin(object, "emitter", &KNOWN_EMITTERS),
         }
@@ -91,13 +91,6 @@ impl<'a> SceneReader<'a> {
 
     fn add_spot_light(&mut self, object: &'a PluginInstance) {
         let intensity = self.light_color(object, "intensity");
-        if object.named_child("texture").is_some() {
-            self.notes.substitute_light(
-                "a spot light with a texture",
-                "the texture is left out",
-                object.span.clone(),
-            );
-        }
         let transform = self.transform_value(object, "to_world");
         let matrix = transform.map_or(DMat4::IDENTITY, |transform| transform.matrix);
         let cutoff = self.float(object, "cutoff_angle").unwrap_or(20.0);
@@ -111,6 +104,12 @@ impl<'a> SceneReader<'a> {
         let Some(axis) = matrix.z_axis.truncate().try_normalize() else {
             return self.error(object.span.clone(), "the light's `to_world` is degenerate", None);
         };
+        if let Some(texture) = object.named_child("texture")
+            && !self.add_spot_texture(object, texture.target, cutoff)
+        {
+            let text = "the texture is left out";
+            self.notes.substitute_light("a spot light with a texture", text, object.span.clone());
+        }
         self.document.start_list_table("light");
         self.set_light_name(object);
         self.document.set("type", "spot");

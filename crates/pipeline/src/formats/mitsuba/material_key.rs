@@ -11,6 +11,10 @@ pub(super) struct MaterialKey {
     pub(super) emitter: Option<ObjectIndex>,
     /// Texture coordinates of the shape, or the default if the material has no textures.
     pub(super) uv: UvConvention,
+    /// The mesh whose attributes the material uses.
+    pub(super) mesh: Option<usize>,
+    /// Bits of the transmittance of the medium inside.
+    pub(super) tint: Option<[u64; 3]>,
 }
 
 /// How a shape's texture coordinates in glimt differ from Mitsuba's.

@@ -6,13 +6,22 @@
 mod assets;
 mod bsdfs;
 mod colors;
+mod curves;
+mod disks;
 mod emitters;
+mod generated;
 mod graph;
+mod instances;
 mod material_key;
+mod media;
+mod mesh_attributes;
 mod placement;
 mod plastic;
+mod ply;
+mod projectors;
 mod property;
 mod reader;
+mod sdf_grids;
 mod settings;
 mod shapes;
 #[cfg(test)]
@@ -22,7 +31,7 @@ mod unused;
 mod values;
 mod xml;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use self::graph::{GraphBuilder, ObjectKind};
 use self::reader::SceneReader;
@@ -49,7 +58,9 @@ pub(super) fn convert(
     check_scene_before_import(read(path, context)?, path)?;
     let (ForeignScene { document, notes, substitutions, .. }, copies) =
         read_scene(path, Some(folder), context)?;
-    let files = read_copied_files(copies, context.token)?;
+    let mut files = read_copied_files(copies, context.token)?;
+    let generated = document.generated_files().iter();
+    files.extend(generated.map(|(name, file)| (PathBuf::from(name), file.bytes.to_vec())));
     Ok(ImportedScene { document, files, substitutions, notes })
 }
 

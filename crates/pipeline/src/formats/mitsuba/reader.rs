@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use super::graph::{Child, ObjectIndex, ObjectKind, PluginInstance, SceneGraph};
 use super::material_key::{BlendPartKey, MaterialKey};
 use super::plastic::PlasticCoat;
+use super::ply::AttributedMesh;
 use super::property::{PropertyValue, SpectrumValue, TransformValue};
 use super::xml::{MAX_ERRORS, shorten};
 use crate::assets::Companion;
@@ -84,7 +85,15 @@ pub(super) struct SceneReader<'a> {
     /// Names of the files that an import writes, by source path.
     pub(super) asset_names: BTreeMap<PathBuf, String>,
     pub(super) used_asset_names: HashSet<String>,
-    /// Properties reported as unused.
+    /// Names of the files that exist only in memory, by their hash.
+    pub(super) generated_names: HashMap<[u8; 32], String>,
+    /// The mesh whose material is being converted, if the material uses its attributes.
+    pub(super) attributes: Option<AttributedMesh>,
+    /// Transmittance per unit of length of the medium in the shape whose material is being converted.
+    pub(super) interior_tint: Option<DVec3>,
+    /// Position of the camera.
+    pub(super) camera_position: Option<DVec3>,
+    /// Objects whose unused properties have been reported.
     pub(super) reported_unused: HashSet<ObjectIndex>,
     pub(super) has_environment: bool,
     /// Name of the black material, if the document has one.
@@ -139,6 +148,10 @@ impl<'a> SceneReader<'a> {
             groups: HashMap::new(),
             asset_names: BTreeMap::new(),
             used_asset_names: HashSet::new(),
+            generated_names: HashMap::new(),
+            attributes: None,
+            interior_tint: None,
+            camera_position: None,
             reported_unused: HashSet::new(),
             has_environment: false,
             black: None,

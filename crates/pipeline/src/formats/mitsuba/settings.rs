@@ -18,7 +18,7 @@ const FILM_DIAGONAL: f64 = 43.266_615_305_567_87;
 const UNLIMITED_DEPTH: f64 = 1000.0;
 
 /// Integrators that solve the whole rendering equation.
-const PATH_INTEGRATORS: [&str; 22] = [
+const PATH_INTEGRATORS: [&str; 21] = [
     "path",
     "volpath",
     "volpathmis",
@@ -33,7 +33,6 @@ const PATH_INTEGRATORS: [&str; 22] = [
     "prbvolpath",
     "prb_basic",
     "prb_projective",
-    "direct_projective",
     "emission_projective",
     "projective_path",
     "pathsimple",
@@ -45,10 +44,10 @@ const PATH_INTEGRATORS: [&str; 22] = [
 /// Integrators with photon maps.
 const PHOTON_INTEGRATORS: [&str; 3] = ["photonmapper", "ppm", "sppm"];
 /// Integrators that render another integrator's light and add channels.
-const WRAPPERS: [&str; 5] = ["moment", "aov", "multichannel", "adaptive", "irrcache"];
+const WRAPPERS: [&str; 6] = ["moment", "aov", "multichannel", "adaptive", "irrcache", "stokes"];
 
 /// The pixels of a film and the part that is rendered.
-struct FilmWindow {
+pub(super) struct FilmWindow {
     /// Size of the whole film.
     size: [f64; 2],
     /// Offset of the crop window.
@@ -58,8 +57,13 @@ struct FilmWindow {
 }
 
 impl FilmWindow {
+    /// The whole of a film.
+    pub(super) fn full(width: f64, height: f64) -> Self {
+        Self { size: [width, height], crop_offset: [0.0; 2], crop_size: [width, height] }
+    }
+
     /// Width divided by height of the whole film.
-    fn aspect(&self) -> f64 {
+    pub(super) fn aspect(&self) -> f64 {
         self.size[0] / self.size[1]
     }
 
@@ -83,6 +87,10 @@ impl<'a> SceneReader<'a> {
         let Some(sensor) = self.select_sensor(scene) else { return };
         let sensor_index = sensor.target;
         let sensor = self.object(sensor_index);
+        if let Some(medium) = self.children_of_kind(sensor, ObjectKind::Medium).next() {
+            let text = "the camera is in a vacuum";
+            self.notes.substitute_light("a sensor in a medium", text, medium.span.clone());
+        }
         let film = self.children_of_kind(sensor, ObjectKind::Film).next().map(|child| child.target);
         let window = self.film_window(film.map(|index| self.object(index)));
         self.document.set_span_for_next_values(sensor.span.clone());
@@ -100,7 +108,7 @@ impl<'a> SceneReader<'a> {
         self.document.set("samples", count.clamp(1, i64::from(u32::MAX)) as f64);
         self.add_integrator(scene);
         self.add_filter(film.map(|index| self.object(index)));
-        self.add_camera(sensor, &window);
+        self.add_camera(scene, sensor, &window);
         self.report_unused_settings(scene, sensor_index);
     }
 
@@ -138,11 +146,7 @@ impl<'a> SceneReader<'a> {
 
     fn film_window(&mut self, film: Option<&'a PluginInstance>) -> FilmWindow {
         let [default_width, default_height] = DEFAULT_FILM_SIZE;
-        let full = |width: i64, height: i64| FilmWindow {
-            size: [width as f64, height as f64],
-            crop_offset: [0.0; 2],
-            crop_size: [width as f64, height as f64],
-        };
+        let full = |width: i64, height: i64| FilmWindow::full(width as f64, height as f64);
         let Some(film) = film else { return full(default_width, default_height) };
         match film.plugin.as_str() {
             "hdrfilm" | "ldrfilm" | "mfilm" | "tiledhdrfilm" | "pngfilm" | "exrfilm" => {}
@@ -252,8 +256,12 @@ impl<'a> SceneReader<'a> {
             if !WRAPPERS.contains(&object.plugin.as_str()) || nested > 8 {
                 break;
             }
-            if matches!(object.plugin.as_str(), "aov" | "multichannel") {
-                let text = "only the light is rendered; --layers adds channels";
+            let text = match object.plugin.as_str() {
+                "aov" | "multichannel" => Some("only the light is rendered; --layers adds channels"),
+                "stokes" => Some("only the light is rendered, without polarization"),
+                _ => None,
+            };
+            if let Some(text) = text {
                 self.notes.note(&format!("`{}`", object.plugin), text, object.span.clone());
             }
             let inner = self.children_of_kind(object, ObjectKind::Integrator).next();
@@ -268,7 +276,9 @@ impl<'a> SceneReader<'a> {
             return;
         };
         self.document.set_span_for_next_values(integrator.span.clone());
-        let depth = self.integer(integrator, "max_depth").unwrap_or(-1);
+        // Mitsuba's differentiable path tracers stop after 6 segments by default.
+        let default_depth = if integrator.plugin.starts_with("prb") { 6 } else { -1 };
+        let depth = self.integer(integrator, "max_depth").unwrap_or(default_depth);
         let depth = if depth < 0 { UNLIMITED_DEPTH } else { (depth - 1).clamp(0, 10_000) as f64 };
         let plugin = integrator.plugin.as_str();
         if self.boolean(integrator, "hide_emitters", false) {
@@ -276,7 +286,7 @@ impl<'a> SceneReader<'a> {
             self.notes.substitute("`hide_emitters`", text, integrator.span.clone());
         }
         match plugin {
-            "direct" => {
+            "direct" | "direct_projective" => {
                 for name in ["emitter_samples", "shading_samples", "bsdf_samples"] {
                     let count = self.integer(integrator, name);
                     if name != "bsdf_samples" && count.is_some_and(|count| count > 1) {
@@ -302,7 +312,6 @@ impl<'a> SceneReader<'a> {
                 self.document.set("enabled", true);
                 self.document.start_table("render");
             }
-            "stokes" => self.refuse(integrator, "polarization"),
             "depth" | "ao" | "field" | "normals" | "albedo" => {
                 let text = "replaced by `path`; --view shows normals, albedo and depth";
                 self.notes.substitute_light(&format!("`{plugin}`"), text, integrator.span.clone());
@@ -320,7 +329,7 @@ impl<'a> SceneReader<'a> {
         }
     }
 
-    fn add_camera(&mut self, sensor: &'a PluginInstance, window: &FilmWindow) {
+    fn add_camera(&mut self, scene: &'a PluginInstance, sensor: &'a PluginInstance, window: &FilmWindow) {
         self.document.set_span_for_next_values(sensor.span.clone());
         let transform = self.transform_value(sensor, "to_world");
         let matrix = transform.map_or(DMat4::IDENTITY, |transform| transform.matrix);
@@ -341,11 +350,12 @@ impl<'a> SceneReader<'a> {
                 sensor.span.clone(),
             );
         }
-        let position = matrix.w_axis.truncate();
+        let position = self.camera_in_front_of_panes(scene, matrix.w_axis.truncate(), forward);
         let target = transform.and_then(|transform| transform.target);
         let distance =
             target.map(|target| (target - position).dot(forward)).filter(|distance| *distance > 0.0);
         self.document.start_table("camera");
+        self.camera_position = Some(position);
         self.document.set("position", position);
         self.document.set("look_at", position + forward * distance.unwrap_or(width.max(1.0)));
         self.document.set("up", up);
@@ -420,7 +430,11 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Tangent of half the vertical field of view of the whole film.
-    fn half_height_of_perspective(&mut self, sensor: &'a PluginInstance, window: &FilmWindow) -> f64 {
+    pub(super) fn half_height_of_perspective(
+        &mut self,
+        sensor: &'a PluginInstance,
+        window: &FilmWindow,
+    ) -> f64 {
         let aspect = window.aspect();
         let (angle, axis, span) = match self.float(sensor, "fov") {
             Some(fov) => {

@@ -7,11 +7,10 @@ use super::material_key::UvConvention;
 use super::placement::{cylinder_matrix, has_normals};
 use super::reader::SceneReader;
 use super::settings::span_of;
-use super::xml::shorten;
 use crate::assets::AssetError;
 use crate::control::ignore_progress;
 use crate::formats::foreign::transform::{
-    is_invertible_affine, is_mirroring, linear_part, matrix_value, similarity_scale,
+    is_invertible_affine, is_mirroring, matrix_value, similarity_scale,
 };
 use crate::math::{DMat4, DVec3};
 
@@ -51,8 +50,8 @@ const CUBE_FACES: [[u32; 4]; 6] =
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ShapeTarget<'n> {
     /// The group, or `None` for the scene.
-    group: Option<&'n str>,
-    depth: u32,
+    pub(super) group: Option<&'n str>,
+    pub(super) depth: u32,
 }
 
 impl ShapeTarget<'_> {
@@ -70,11 +69,7 @@ impl<'a> SceneReader<'a> {
             self.error(object.span.clone(), "shapes are nested too deeply", None);
             return false;
         }
-        if let Some(medium) = self.children_of_kind(object, ObjectKind::Medium).next() {
-            let medium = self.object(medium.target);
-            self.refuse(medium, "participating media");
-            return false;
-        }
+        self.interior_tint = self.interior_tint(object);
         if let Some(subsurface) = self.children_of_kind(object, ObjectKind::Subsurface).next() {
             let subsurface = self.object(subsurface.target);
             self.refuse(subsurface, "subsurface scattering");
@@ -100,8 +95,9 @@ impl<'a> SceneReader<'a> {
             "disk" => self.add_disk(object, target),
             "rectangle" => self.add_rectangle(object, target),
             "cube" => self.add_cube(object, target),
-            "hair" | "bsplinecurve" | "linearcurve" | "sdfgrid" | "heightfield" | "ellipsoids"
-            | "ellipsoidsmesh" | "deformable" => {
+            "bsplinecurve" | "linearcurve" => self.add_curves(object, target),
+            "sdfgrid" => self.add_distance_grid(object, target),
+            "hair" | "heightfield" | "ellipsoids" | "ellipsoidsmesh" | "deformable" => {
                 self.refuse(object, "this kind of shape");
                 false
             }
@@ -110,6 +106,7 @@ impl<'a> SceneReader<'a> {
                 false
             }
         };
+        self.interior_tint = None;
         self.report_unused(index);
         if is_added {
             self.report_unused_children(index);
@@ -118,7 +115,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Adds all nested shapes of an object. Returns whether anything was added.
-    fn add_shapes_of(&mut self, object: &'a PluginInstance, target: ShapeTarget<'_>) -> bool {
+    pub(super) fn add_shapes_of(&mut self, object: &'a PluginInstance, target: ShapeTarget<'_>) -> bool {
         let mut is_added = false;
         for child in self.children_of_kind(object, ObjectKind::Shape) {
             is_added |= self.add_shape(child.target, target);
@@ -127,7 +124,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Returns the name of a shape's material. Returns `None` if the shape is invisible or has errors.
-    fn shape_material(&mut self, object: &'a PluginInstance, uv: UvConvention) -> Option<String> {
+    pub(super) fn shape_material(&mut self, object: &'a PluginInstance, uv: UvConvention) -> Option<String> {
         let bsdf: Option<&'a Child> = self.children_of_kind(object, ObjectKind::Bsdf).next();
         if let Some(second) = self.children_of_kind(object, ObjectKind::Bsdf).nth(1) {
             let text = "only the first is used";
@@ -162,7 +159,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Returns the transform of a shape, or reports an error and returns `None`.
-    fn shape_transform(&mut self, object: &'a PluginInstance) -> Option<DMat4> {
+    pub(super) fn shape_transform(&mut self, object: &'a PluginInstance) -> Option<DMat4> {
         let matrix = self.world_matrix(object);
         if !is_invertible_affine(&matrix) {
             let text = "skipped";
@@ -173,7 +170,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Starts the table of a shape.
-    fn start_shape(
+    pub(super) fn start_shape(
         &mut self,
         object: &'a PluginInstance,
         target: ShapeTarget<'_>,
@@ -192,7 +189,7 @@ impl<'a> SceneReader<'a> {
         self.document.set("material", material);
     }
 
-    fn set_matrix(&mut self, matrix: &DMat4) {
+    pub(super) fn set_matrix(&mut self, matrix: &DMat4) {
         if *matrix != DMat4::IDENTITY {
             self.document.set("matrix", matrix_value(matrix));
         }
@@ -223,8 +220,22 @@ impl<'a> SceneReader<'a> {
             self.notes.note("a mesh without area", "skipped", span);
             return false;
         }
+        self.prepare_attributes(object, &path);
+        let material = self.shape_material(object, uv);
+        let attributes = self.attributes.take();
+        let Some(material) = material else { return false };
+        // Normals in the file are mirrored with the mesh, computed normals are not.
+        let is_mirrored = is_mirroring(&matrix) && (has_flat_faces || !has_normals(&path));
+        if is_flipped != is_mirrored {
+            self.note_flipped_normals(object);
+        }
+        for name in ["max_smooth_angle", "flip_uvs", "srgb"] {
+            object.property(name);
+        }
+        if let Some(attributes) = attributes {
+            return self.add_attributed_mesh(&attributes, object, target, material, &matrix);
+        }
         let file = self.asset_reference(&path);
-        let Some(material) = self.shape_material(object, uv) else { return false };
         self.start_shape(object, target, "mesh", material);
         self.document.set_span_for_next_values(span);
         self.document.set("file", file);
@@ -236,14 +247,6 @@ impl<'a> SceneReader<'a> {
             self.document.set("smooth", false);
         }
         self.set_matrix(&matrix);
-        // Normals in the file are mirrored with the mesh, computed normals are not.
-        let is_mirrored = is_mirroring(&matrix) && (has_flat_faces || !has_normals(&path));
-        if is_flipped != is_mirrored {
-            self.note_flipped_normals(object);
-        }
-        for name in ["max_smooth_angle", "flip_uvs", "srgb"] {
-            object.property(name);
-        }
         true
     }
 
@@ -296,7 +299,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Whether the material of a shape depends on its texture coordinates or tangents.
-    fn shape_uses_coordinates(&self, object: &'a PluginInstance) -> bool {
+    pub(super) fn shape_uses_coordinates(&self, object: &'a PluginInstance) -> bool {
         let children = object.children.iter().map(|child| child.target);
         self.any_nested(children, |inner| {
             inner.kind == ObjectKind::Texture || inner.properties.iter().any(|one| one.name == "alpha_u")
@@ -343,32 +346,6 @@ impl<'a> SceneReader<'a> {
         self.document.set("caps", false);
         if is_flipped != is_mirroring(&matrix) {
             self.note_flipped_normals(object);
-        }
-        true
-    }
-
-    fn add_disk(&mut self, object: &'a PluginInstance, target: ShapeTarget<'_>) -> bool {
-        let Some(matrix) = self.shape_transform(object) else { return false };
-        let is_flipped = self.boolean(object, "flip_normals", false);
-        if self.shape_uses_coordinates(object) {
-            let text = "mapped onto the disk's square instead of radius and angle";
-            self.notes.substitute_light("a textured `disk`", text, object.span.clone());
-        }
-        let Some(material) = self.shape_material(object, UvConvention::default()) else { return false };
-        self.start_shape(object, target, "disk", material);
-        let normal = if is_flipped { DVec3::NEG_Z } else { DVec3::Z };
-        match similarity_scale(&matrix) {
-            Some(scale) => {
-                let normal = linear_part(&matrix).inverse().transpose() * normal;
-                self.document.set("center", matrix.transform_point3(DVec3::ZERO));
-                self.document.set("normal", normal.normalize());
-                self.document.set("radius", scale);
-            }
-            None => {
-                self.document.set("normal", normal);
-                self.document.set("radius", 1.0);
-                self.set_matrix(&matrix);
-            }
         }
         true
     }
@@ -427,48 +404,5 @@ impl<'a> SceneReader<'a> {
             }
         }
         true
-    }
-
-    /// Adds an instance, and its group if it is new.
-    fn add_instance(&mut self, object: &'a PluginInstance, target: ShapeTarget<'_>) -> bool {
-        let Some(matrix) = self.shape_transform(object) else { return false };
-        let Some(child) = self.children_of_kind(object, ObjectKind::Shape).next() else {
-            let help = "add a <ref> to a `shapegroup`".to_owned();
-            self.error(object.span.clone(), "the instance has no shape group", Some(help));
-            return false;
-        };
-        let group = self.object(child.target);
-        if group.plugin != "shapegroup" {
-            let message = format!("an instance needs a `shapegroup`, found `{}`", shorten(&group.plugin));
-            self.error(child.span.clone(), message, None);
-            return false;
-        }
-        let Some(name) = self.group(child.target, target.depth + 1) else { return false };
-        self.document.set_span_for_next_values(object.span.clone());
-        match target.group {
-            Some(group) => self.document.group_list_table(group, "instance"),
-            None => self.document.start_list_table("instance"),
-        }
-        self.document.set("group", name);
-        if let Some(id) = &object.id {
-            let name = self.shape_names.make_unique(id, "instance");
-            self.document.set("name", name);
-        }
-        self.set_matrix(&matrix);
-        true
-    }
-
-    /// Returns the name of a group, adding it if it is new. Returns `None` if it has no visible shapes.
-    fn group(&mut self, index: ObjectIndex, depth: u32) -> Option<String> {
-        if let Some(known) = self.groups.get(&index) {
-            return known.clone();
-        }
-        let object = self.object(index);
-        let name = self.group_names.make_unique(object.id.as_deref().unwrap_or("group"), "group");
-        let target = ShapeTarget { group: Some(&name), depth };
-        let is_added = self.add_shapes_of(object, target);
-        let name = is_added.then_some(name);
-        self.groups.insert(index, name.clone());
-        name
     }
 }

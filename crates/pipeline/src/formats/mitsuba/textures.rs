@@ -1,5 +1,7 @@
 //! Converts textures.
 
+use std::ops::Range;
+
 use super::graph::{ObjectIndex, ObjectKind, PluginInstance};
 use super::material_key::UvConvention;
 use super::reader::{ColorRole, ColorSource, SceneReader, luminance};
@@ -111,9 +113,13 @@ impl<'a> SceneReader<'a> {
                 return self.texture_with_factor(inner, usage, uv, factor * scale);
             }
             "mesh_attribute" | "vertexcolors" | "vertex_color" => {
-                let text = "replaced by its usual value, gray";
-                self.notes.substitute_light(&format!("`{}`", object.plugin), text, object.span.clone());
-                return None;
+                if let Some(found) = self.attribute_keys(object, usage) {
+                    found
+                } else {
+                    let text = "replaced by its usual value, gray";
+                    self.notes.substitute_light(&format!("`{}`", object.plugin), text, object.span.clone());
+                    return None;
+                }
             }
             "gridtexture" | "wireframe" | "curvature" | "volume" => {
                 let text = "replaced by gray";
@@ -139,22 +145,9 @@ impl<'a> SceneReader<'a> {
         if factor != 1.0 {
             keys.push(("factor", shorten_number(factor).into()));
         }
-        let identity = format!("{keys:?}");
-        if let Some(known) = self.textures.get(&identity) {
-            return Some(known.clone());
-        }
-        let name = self.texture_names.make_unique(object.id.as_deref().unwrap_or(&wanted), "texture");
-        self.document.set_span_for_next_values(object.span.clone());
-        self.document.start_named_table("textures", &name);
-        // Errors of the image are reported at the name of the file.
-        if let Some(file) = keys.extract_if(.., |(key, _)| *key == "file").next() {
-            self.document.set_span_for_next_values(span_of(object, "filename"));
-            self.set_all(vec![file]);
-            self.document.set_span_for_next_values(object.span.clone());
-        }
-        self.set_all(keys);
-        self.textures.insert(identity, name.clone());
-        Some(name)
+        let wanted = object.id.as_deref().unwrap_or(&wanted).to_owned();
+        let spans = [object.span.clone(), span_of(object, "filename")];
+        Some(self.add_texture_table(keys, &wanted, spans))
     }
 
     /// Returns the color of a spectrum that is used in place of a texture.
@@ -259,7 +252,7 @@ impl<'a> SceneReader<'a> {
         }
         let is_raw = self.boolean(object, "raw", false);
         let gamma = self.float(object, "gamma");
-        let is_float = FLOAT_IMAGES.contains(&kind.as_str());
+        let is_float = is_float_image(&kind);
         if !is_float && usage != MitsubaTextureUse::Normal {
             let is_linear = is_raw || gamma == Some(1.0);
             keys.push(("encoding", if is_linear { "linear" } else { "srgb" }.into()));
@@ -292,7 +285,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Colors of a checkerboard, which may not be textures themselves.
-    fn checker_colors(&mut self, object: &'a PluginInstance) -> [DVec3; 2] {
+    pub(super) fn checker_colors(&mut self, object: &'a PluginInstance) -> [DVec3; 2] {
         let mut color =
             |name: &str, default: f64| match self.color(object, name, ColorRole::Reflectance, default) {
                 ColorSource::Constant(color) => color,
@@ -327,7 +320,7 @@ impl<'a> SceneReader<'a> {
         Some(self.checker_keys(object, colors, uv))
     }
 
-    fn checker_keys(
+    pub(super) fn checker_keys(
         &mut self,
         object: &'a PluginInstance,
         colors: [DVec3; 2],
@@ -339,23 +332,45 @@ impl<'a> SceneReader<'a> {
         keys
     }
 
+    /// Adds a texture with these keys unless an equal one exists, and returns its name. The spans are those
+    /// of the texture and of its file name.
+    pub(super) fn add_texture_table(
+        &mut self,
+        mut keys: TableEntries,
+        wanted: &str,
+        [span, file_span]: [Range<usize>; 2],
+    ) -> String {
+        let identity = format!("{keys:?}");
+        if let Some(known) = self.textures.get(&identity) {
+            return known.clone();
+        }
+        let name = self.texture_names.make_unique(wanted, "texture");
+        self.document.set_span_for_next_values(span.clone());
+        self.document.start_named_table("textures", &name);
+        // Errors of the image are reported at the name of the file.
+        if let Some(file) = keys.extract_if(.., |(key, _)| *key == "file").next() {
+            self.document.set_span_for_next_values(file_span);
+            self.set_all(vec![file]);
+            self.document.set_span_for_next_values(span);
+        }
+        self.set_all(keys);
+        self.textures.insert(identity, name.clone());
+        name
+    }
+
     /// Adds a checkerboard of α as a texture of √α.
     fn checkerboard_of_roots(&mut self, index: ObjectIndex, uv: UvConvention) -> Option<String> {
         let object = self.object(index);
         let [first, second] = self.checker_colors(object);
         let root = |color: DVec3| DVec3::splat(libm::sqrt(luminance(color).clamp(1e-4, 1.0)));
         let keys = self.checker_keys(object, [root(second), root(first)], uv);
-        let identity = format!("{keys:?}");
-        if let Some(known) = self.textures.get(&identity) {
-            return Some(known.clone());
-        }
-        let name = self.texture_names.make_unique("roughness", "texture");
-        self.document.set_span_for_next_values(object.span.clone());
-        self.document.start_named_table("textures", &name);
-        self.set_all(keys);
-        self.textures.insert(identity, name.clone());
-        Some(name)
+        Some(self.add_texture_table(keys, "roughness", [object.span.clone(), object.span.clone()]))
     }
+}
+
+/// Whether an extension is of images with linear floating-point values.
+pub(super) fn is_float_image(extension: &str) -> bool {
+    FLOAT_IMAGES.contains(&extension)
 }
 
 /// Returns the extension of a file name in lowercase.

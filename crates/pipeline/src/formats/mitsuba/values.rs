@@ -201,10 +201,11 @@ fn parse_step(step: &Element) -> Result<(DMat4, Option<DVec3>), ValueError> {
         "rotate" => {
             let axis = parse_point(step, Some(0.0))?;
             let angle = required("angle")?;
-            if axis == DVec3::ZERO {
+            let angle = parse_float(&angle.value, &angle.span)?;
+            if axis == DVec3::ZERO && angle != 0.0 {
                 return Err(ValueError::new(&step.span, "the axis of the rotation is zero"));
             }
-            rotation_about_raw_axis(axis, parse_float(&angle.value, &angle.span)?)
+            rotation_about_raw_axis(axis, angle)
         }
         "lookat" => return parse_look_at(step),
         "matrix" => parse_matrix(required("value")?)?,

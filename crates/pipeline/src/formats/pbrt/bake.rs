@@ -6,7 +6,6 @@ use rayon::prelude::*;
 
 use super::lexer::{PbrtError, PbrtResult};
 use super::memo;
-use super::pixels::Pixels;
 use super::scene::SceneWriter;
 use super::texture_nodes::{ImageFilter, ImageNode, ImageWrap, TextureNode, UvMapping};
 use super::textures::{PbrtTextureUse, push_mapping};
@@ -14,6 +13,7 @@ use crate::assets::image::{ColorEncoding, ColorTransferFunction, ImageLimits, lo
 use crate::assets::{AssetError, Companion};
 use crate::control::{CancelToken, ignore_progress};
 use crate::formats::foreign::import::TableEntries;
+use crate::formats::foreign::pixels::Pixels;
 use crate::materials::texels::Texels;
 use crate::math::color::luminance;
 use crate::math::{DVec2, DVec3, Vec3};

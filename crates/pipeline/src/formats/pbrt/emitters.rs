@@ -3,12 +3,12 @@
 use super::colors::SpectrumUse;
 use super::lexer::{PbrtError, PbrtResult};
 use super::material_tables::{Emission, ShapeProperties};
-use super::meshes::MeshData;
 use super::parameters::Parameters;
 use super::scene::SceneWriter;
 use super::shapes::round_shape_area;
 use super::state::{Entity, ShapeEntity};
 use super::texture_nodes::{ImageFilter, ImageNode, ImageWrap, TextureNode, TextureValue, UvMapping};
+use crate::formats::foreign::meshes::MeshData;
 use crate::math::{DMat4, DVec3};
 use crate::scene::nearest::nearest_name;
 use crate::scene::sanitize::escape_and_truncate;

@@ -4,13 +4,13 @@ use std::io::Read;
 use std::path::Path;
 
 use super::lexer::{PbrtError, PbrtResult};
-use super::meshes::MeshData;
 use super::parameters::{Parameters, Text};
 use super::scene::SceneWriter;
 use super::shapes::Placement;
 use crate::assets::mesh::{load, load_from_bytes};
 use crate::assets::{AssetError, Companion, LoadedMesh, read_gzip_file};
 use crate::control::ignore_progress;
+use crate::formats::foreign::meshes::MeshData;
 use crate::formats::foreign::transform::matrix_value;
 use crate::math::DMat4;
 use crate::system::file::FileStamp;

@@ -3,10 +3,10 @@
 use std::ops::Range;
 
 use super::lexer::{PbrtError, PbrtResult};
-use super::meshes::MeshData;
 use super::parameters::Parameters;
 use super::scene::{LoweredMaterial, SceneWriter};
 use super::state::ShapeEntity;
+use crate::formats::foreign::meshes::MeshData;
 use crate::formats::foreign::transform::{is_invertible_affine, matrix_value, similarity_scale};
 use crate::formats::rounding::shorten;
 use crate::math::{DMat4, DVec2, DVec3};
@@ -309,7 +309,7 @@ fn triangle_mesh(parameters: &Parameters) -> PbrtResult<MeshData> {
     let normals = per_vertex(parameters, "N", parameters.normals("N")?, count)?;
     let uvs = per_vertex(parameters, "uv", parameters.point2s("uv")?, count)?;
     parameters.ignore(&["S", "faceIndices"]);
-    Ok(MeshData { positions, normals, uvs, triangles })
+    Ok(MeshData { positions, normals, uvs, triangles, ..MeshData::default() })
 }
 
 /// Reads a `bilinearmesh` and tessellates its patches, whose corners are (0, 0), (1, 0), (0, 1) and (1, 1).

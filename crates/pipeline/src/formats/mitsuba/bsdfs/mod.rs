@@ -1,5 +1,6 @@
 //! Converts BSDFs to materials.
 
+mod checkered;
 mod nested;
 mod surfaces;
 
@@ -107,7 +108,9 @@ impl<'a> SceneReader<'a> {
         let has_textures =
             self.any_nested(index.into_iter().chain(emitter), |inner| inner.kind == ObjectKind::Texture);
         let uv = if has_textures { uv } else { UvConvention::default() };
-        let key = MaterialKey { bsdf: index, emitter, uv };
+        let mesh = self.attributes.as_ref().map(|mesh| mesh.id);
+        let tint = self.interior_tint.map(|tint| tint.to_array().map(f64::to_bits));
+        let key = MaterialKey { bsdf: index, emitter, uv, mesh, tint };
         if let Some(known) = self.materials.get(&key) {
             return known.clone();
         }
@@ -203,7 +206,8 @@ impl<'a> SceneReader<'a> {
         let context = BsdfContext { depth: context.depth + 1, ..context };
         let built = match object.plugin.as_str() {
             "diffuse" | "lambertian" => {
-                let color = self.reflectance(object, "reflectance", 0.5, context);
+                let color = self.vertex_color_scale(object);
+                let color = color.unwrap_or_else(|| self.reflectance(object, "reflectance", 0.5, context));
                 Some(MaterialBuilder::one_sided("phong", vec![("diffuse", color)]))
             }
             "roughdiffuse" => {

@@ -78,20 +78,7 @@ impl<'a> SceneReader<'a> {
         context: BsdfContext,
         may_be_anisotropic: bool,
     ) {
-        let name = self.text(object, "distribution");
-        match name {
-            None => keys.push(("distribution", "beckmann".into())),
-            Some(("beckmann", _)) => keys.push(("distribution", "beckmann".into())),
-            Some(("ggx", _)) => {}
-            Some(("phong" | "as", span)) => {
-                self.notes.substitute("the Phong microfacet distribution", "replaced by Beckmann", span);
-                keys.push(("distribution", "beckmann".into()));
-            }
-            Some((other, span)) => {
-                let help = "expected beckmann or ggx".to_owned();
-                self.error(span, format!("unknown distribution `{}`", shorten(other)), Some(help));
-            }
-        }
+        self.add_distribution_name(keys, object);
         let has_pair = ["alpha_u", "alpha_v"]
             .iter()
             .any(|name| object.property(name).is_some() || object.named_child(name).is_some());
@@ -105,28 +92,7 @@ impl<'a> SceneReader<'a> {
         let along = self.number(object, "alpha_v", default_alpha);
         match (across, along) {
             (NumberSource::Constant(u), NumberSource::Constant(v)) => {
-                let (u, v) = (u.clamp(1e-4, 1.0), v.clamp(1e-4, 1.0));
-                keys.push(("roughness", shorten_number(libm::sqrt(libm::sqrt(u * v))).into()));
-                let ratio = if v > u { u / v } else { v / u };
-                let anisotropy = (1.0 - ratio) / 0.9;
-                if anisotropy > 1.0 {
-                    let text = "the ratio is limited to 10";
-                    self.notes.substitute(
-                        "`alpha_u` and `alpha_v` that differ by more than a factor of 10",
-                        text,
-                        object.span.clone(),
-                    );
-                }
-                let signed = if v > u { -anisotropy } else { anisotropy };
-                if may_be_anisotropic && signed != 0.0 {
-                    keys.push(("anisotropy", shorten_number(signed.clamp(-1.0, 1.0)).into()));
-                } else if signed != 0.0 {
-                    self.notes.substitute_light(
-                        "anisotropic roughness of glass",
-                        "replaced by its mean",
-                        object.span.clone(),
-                    );
-                }
+                self.add_alpha_pair(keys, object, [u, v], may_be_anisotropic);
             }
             (NumberSource::Texture(_) | NumberSource::Constant(_), _) => {
                 let one = if matches!(across, NumberSource::Texture(_)) { across } else { along };
@@ -134,6 +100,24 @@ impl<'a> SceneReader<'a> {
                 self.notes.substitute_light("textured `alpha_u` and `alpha_v`", text, object.span.clone());
                 let roughness = self.roughness_value(one, object, context);
                 keys.push(("roughness", roughness));
+            }
+        }
+    }
+
+    /// Adds the key `distribution` of a microfacet distribution.
+    pub(super) fn add_distribution_name(&mut self, keys: &mut TableEntries, object: &'a PluginInstance) {
+        let name = self.text(object, "distribution");
+        match name {
+            None => keys.push(("distribution", "beckmann".into())),
+            Some(("beckmann", _)) => keys.push(("distribution", "beckmann".into())),
+            Some(("ggx", _)) => {}
+            Some(("phong" | "as", span)) => {
+                self.notes.substitute("the Phong microfacet distribution", "replaced by Beckmann", span);
+                keys.push(("distribution", "beckmann".into()));
+            }
+            Some((other, span)) => {
+                let help = "expected beckmann or ggx".to_owned();
+                self.error(span, format!("unknown distribution `{}`", shorten(other)), Some(help));
             }
         }
     }
@@ -180,6 +164,9 @@ impl<'a> SceneReader<'a> {
                 return Some(MaterialBuilder::one_sided("mirror", vec![("reflectance", color)]));
             }
             let mut keys = vec![("color", color)];
+            if let Some(blend) = self.checkered_metal(&keys, object, context) {
+                return Some(blend);
+            }
             self.add_distribution(&mut keys, object, 0.1, context, true);
             return Some(MaterialBuilder::one_sided("metal", keys));
         }
@@ -213,13 +200,19 @@ impl<'a> SceneReader<'a> {
                 span_of(object, "ext_eta"),
             );
         }
+        let scale = self.color(object, "specular_reflectance", ColorRole::Reflectance, 1.0);
+        if is_rough
+            && scale == ColorSource::Constant(DVec3::ONE)
+            && let Some(blend) = self.checkered_metal(&keys, object, context)
+        {
+            return Some(blend);
+        }
         if is_rough {
             self.add_distribution(&mut keys, object, 0.1, context, true);
         } else {
             keys.push(("roughness", 0.0.into()));
         }
         let metal = MaterialBuilder::one_sided("metal", keys);
-        let scale = self.color(object, "specular_reflectance", ColorRole::Reflectance, 1.0);
         Some(self.scaled_metal(metal, scale, object, context))
     }
 
@@ -300,6 +293,9 @@ impl<'a> SceneReader<'a> {
                 self.add_distribution(&mut keys, object, 0.1, context, false);
             }
             _ => self.ignored_scale(object, "specular_transmittance"),
+        }
+        if let Some(tint) = self.interior_tint.filter(|_| object.plugin != "thindielectric") {
+            keys.push(("tint", shorten_color(tint)));
         }
         MaterialBuilder { is_glass: true, ..MaterialBuilder::new("glass", keys) }
     }
@@ -418,11 +414,13 @@ impl<'a> SceneReader<'a> {
             }
         };
         keys.push(("ior", shorten_number(ior.clamp(1.0, 10.0)).into()));
+        let has_sheen = self.number(object, "sheen", 0.0) != NumberSource::Constant(0.0);
         for name in
             ["anisotropic", "spec_trans", "spec_tint", "sheen", "sheen_tint", "flatness", "diff_trans"]
         {
             let is_zero = matches!(self.number(object, name, 0.0), NumberSource::Constant(0.0));
-            if !is_zero {
+            // The tint of a sheen that is 0 has no effect.
+            if !is_zero && (name != "sheen_tint" || has_sheen) {
                 let subject = format!("`{name}` of `{}`", object.plugin);
                 self.notes.substitute_light(&subject, "ignored", span_of(object, name));
             }

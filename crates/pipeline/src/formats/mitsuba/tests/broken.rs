@@ -12,7 +12,7 @@ fn place(diagnostic: &Diagnostic) -> (usize, usize) {
 }
 
 /// Scenes whose line 3 has a mistake at `^`, and a part of the message.
-const MISTAKES: [(&str, &str); 44] = [
+const MISTAKES: [(&str, &str); 43] = [
     (r#"<^shap type="sphere"/>"#, "unknown element <shap>"),
     (r#"<shape type="^spher"/>"#, "unknown shape `spher`"),
     (r#"<^shape/>"#, "`type` is missing"),
@@ -84,7 +84,6 @@ const MISTAKES: [(&str, &str); 44] = [
         r#"<shape type="sphere"><bsdf type="diffuse"><texture name="reflectance" type="^bitmp"/></bsdf></shape>"#,
         "unknown texture",
     ),
-    (r#"<shape type="sphere"><medium type="^homogeneous" name="interior"/></shape>"#, "participating media"),
     (r#"<shape type="^instance"/>"#, "no shape group"),
     (r#"<shape type="sphere"><emitter type="^point"/></shape>"#, "only contain an `area` emitter"),
     (r#"<emitter type="^poit"/>"#, "unknown emitter"),

@@ -1,5 +1,6 @@
 //! Mutated scenes must not cause panics or hangs.
 
+use super::features::ATTRIBUTES;
 use super::{Bench, OBJ, SENSOR, scene_from_document};
 
 /// A scene that uses most elements.
@@ -14,7 +15,16 @@ const SCENE: &str = r##"<default name="r" value="0.5"/><integrator type="path"><
 <shape type="disk"><bsdf type="blendbsdf"><texture type="checkerboard" name="weight"><transform name="to_uv"><scale x="3"/></transform>
 </texture><bsdf type="conductor"/><bsdf type="diffuse"/></bsdf></shape>
 <emitter type="spot"><transform name="to_world"><lookat origin="0,0,1" target="0,0,0" up="0,1,0"/></transform></emitter>
-<emitter type="sunsky"><float name="turbidity" value="3"/></emitter>"##;
+<emitter type="sunsky"><float name="turbidity" value="3"/></emitter>
+<shape type="bsplinecurve"><string name="filename" value="a.txt"/><transform name="to_world"><scale value="2"/></transform></shape>
+<shape type="linearcurve"><string name="filename" value="a.txt"/><bsdf type="diffuse"/></shape>
+<shape type="ply"><string name="filename" value="a.ply"/><bsdf type="diffuse"><texture type="mesh_attribute" name="reflectance">
+<string name="name" value="face_color"/></texture></bsdf></shape>
+<shape type="sphere"><bsdf type="dielectric"/><medium name="interior" type="homogeneous"><float name="albedo" value="0"/></medium></shape>
+<shape type="sphere"><bsdf type="roughconductor"><string name="material" value="Au"/><texture name="alpha_u" type="checkerboard"/>
+<float name="alpha_v" value="0.3"/></bsdf></shape>
+<emitter type="projector"><float name="fov" value="40"/><rgb name="irradiance" value="1, 2, 3"/><transform name="to_world">
+<lookat origin="0,0,5" target="0,0,0" up="0,1,0"/></transform></emitter>"##;
 
 /// Replacements for attribute values.
 const WORDS: [&str; 18] = [
@@ -84,7 +94,8 @@ fn mutation_count() -> usize {
 #[test]
 fn mutated_scenes_do_not_panic() {
     let bench = Bench::new();
-    bench.write("a.obj", OBJ);
+    bench.write("a.obj", OBJ).write("a.ply", ATTRIBUTES);
+    bench.write("a.txt", "0 0 0 1\n1 0 0 1\n2 1 0 0.5\n3 0 0 1\n");
     let original = format!("<scene version=\"3.0.0\">{SENSOR}{SCENE}</scene>");
     bench.write("scene.xml", &original);
     assert!(bench.read().is_ok());

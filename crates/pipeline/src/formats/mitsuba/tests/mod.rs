@@ -2,6 +2,7 @@
 
 mod broken;
 mod facts;
+mod features;
 mod files;
 mod fuzz;
 mod limits;

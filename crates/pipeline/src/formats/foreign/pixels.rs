@@ -4,21 +4,21 @@ use crate::math::{DVec2, DVec3, Vec3};
 
 /// An image of linear values, with the top row first.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Pixels {
-    pub(super) width: usize,
-    pub(super) height: usize,
-    pub(super) values: Vec<Vec3>,
+pub(crate) struct Pixels {
+    pub(crate) width: usize,
+    pub(crate) height: usize,
+    pub(crate) values: Vec<Vec3>,
 }
 
 impl Pixels {
     /// Returns the value at a column and a row, which must be in range.
-    pub(super) fn get(&self, column: usize, row: usize) -> DVec3 {
+    pub(crate) fn get(&self, column: usize, row: usize) -> DVec3 {
         self.values[row * self.width + column].as_dvec3()
     }
 
     /// Interpolates between texel centers. `at` is in pixels from the top left corner. `index` maps a column
     /// or row, which may be outside the image, to one inside, or returns `None` for black.
-    pub(super) fn bilinear(&self, at: DVec2, index: impl Fn(i64, usize) -> Option<usize>) -> DVec3 {
+    pub(crate) fn bilinear(&self, at: DVec2, index: impl Fn(i64, usize) -> Option<usize>) -> DVec3 {
         let corner = (at - 0.5).floor();
         let part = at - 0.5 - corner;
         let texel = |column: i64, row: i64| {
@@ -31,7 +31,7 @@ impl Pixels {
     }
 
     /// Encodes the image as PFM. `is_gray` keeps only the first component.
-    pub(super) fn encode_pfm(&self, is_gray: bool) -> Vec<u8> {
+    pub(crate) fn encode_pfm(&self, is_gray: bool) -> Vec<u8> {
         let magic = if is_gray { "Pf" } else { "PF" };
         let mut bytes = format!("{magic}\n{} {}\n-1.0\n", self.width, self.height).into_bytes();
         bytes.reserve(self.values.len() * if is_gray { 4 } else { 12 });
