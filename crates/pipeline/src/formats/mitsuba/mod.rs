@@ -15,6 +15,7 @@ mod property;
 mod reader;
 mod settings;
 mod shapes;
+mod tags;
 #[cfg(test)]
 mod tests;
 mod textures;
