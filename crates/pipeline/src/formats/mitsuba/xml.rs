@@ -257,10 +257,14 @@ impl<'a> XmlLoader<'a> {
         let folder = substitute(&value.value, &self.parameters).replace('\\', "/");
         let span = value.span.clone();
         let near = file.parent().unwrap_or(Path::new("")).join(&folder);
-        let found = std::iter::once(near).chain(self.folders.iter().rev().map(|known| known.join(&folder)));
-        match found.into_iter().find(|folder| folder.is_dir()) {
-            Some(folder) => self.folders.push(folder),
-            None => self.error(span, format!("folder not found: {}", shorten(&folder)), None),
+        let others = self.folders.iter().rev().map(|known| known.join(&folder));
+        let candidates: Vec<PathBuf> = std::iter::once(near).chain(others).collect();
+        match candidates.iter().find(|folder| folder.is_dir()) {
+            Some(folder) => self.folders.push(folder.clone()),
+            None => {
+                candidates.into_iter().for_each(|folder| self.reader.watch_missing(folder));
+                self.error(span, format!("folder not found: {}", shorten(&folder)), None);
+            }
         }
     }
 
