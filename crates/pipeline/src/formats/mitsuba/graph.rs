@@ -13,6 +13,9 @@ use crate::scene::SourceFiles;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::nearest::nearest_name;
 
+/// Maximum number of properties of an object.
+const MAX_PROPERTIES: usize = 1000;
+
 /// Index of an object in the graph.
 pub(super) type ObjectIndex = usize;
 
@@ -139,6 +142,8 @@ pub(super) struct GraphBuilder<'a> {
     references: Vec<Reference>,
     files: &'a SourceFiles,
     pub(super) errors: Vec<Diagnostic>,
+    /// The last object with too many properties.
+    overfull: Option<ObjectIndex>,
     token: &'a CancelToken,
 }
 
@@ -156,8 +161,8 @@ const UNRESOLVED: ObjectIndex = usize::MAX;
 
 impl<'a> GraphBuilder<'a> {
     pub(super) fn new(files: &'a SourceFiles, token: &'a CancelToken) -> Self {
-        let (graph, ids, references, errors) = Default::default();
-        Self { graph, ids, references, files, errors, token }
+        let (graph, ids, references, errors, overfull) = Default::default();
+        Self { graph, ids, references, files, errors, overfull, token }
     }
 
     fn error(&mut self, span: Range<usize>, message: impl Into<String>, help: Option<String>) {
@@ -284,6 +289,12 @@ impl<'a> GraphBuilder<'a> {
             Err(ValueError { span, message, help }) => return self.error(span, message, help),
         };
         let span = element.attribute("value").map_or(element.span.clone(), |value| value.span.clone());
+        if self.graph.objects[parent].properties.len() >= MAX_PROPERTIES {
+            if self.overfull.replace(parent) != Some(parent) {
+                self.error(span, format!("more than {MAX_PROPERTIES} properties"), None);
+            }
+            return;
+        }
         let properties = &mut self.graph.objects[parent].properties;
         if let Some(known) = properties.iter_mut().find(|known| known.name == name) {
             // Version 0.6 only warns about duplicates.

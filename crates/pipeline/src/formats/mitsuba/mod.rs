@@ -24,6 +24,7 @@ mod reader;
 mod sdf_grids;
 mod settings;
 mod shapes;
+mod tags;
 #[cfg(test)]
 mod tests;
 mod textures;

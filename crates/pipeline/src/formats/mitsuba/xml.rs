@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use roxmltree::{Document, Node, ParsingOptions, TextPos};
 
+use super::tags::{MAX_ATTRIBUTES, overfull_tag};
 use crate::assets::AssetError;
 use crate::control::CancelToken;
 use crate::formats::foreign::sources::SourceReader;
@@ -112,6 +113,11 @@ impl<'a> XmlLoader<'a> {
 
     fn load_file(&mut self, path: &Path) -> Result<Option<Element>, AssetError> {
         let (text, start) = self.reader.read(path, self.token)?;
+        if let Some(span) = overfull_tag(&text) {
+            let message = format!("the element has more than {MAX_ATTRIBUTES} attributes");
+            self.error(start + span.start..start + span.end, message, None);
+            return Ok(None);
+        }
         let options = ParsingOptions { nodes_limit: MAX_NODES, ..ParsingOptions::default() };
         let document = match Document::parse_with_options(&text, options) {
             Ok(document) => document,
@@ -221,7 +227,8 @@ impl<'a> XmlLoader<'a> {
         let text = &source.text[range.clone()];
         let start = range.start + text.len() - text.trim_start().len();
         let line = text.trim().lines().next().unwrap_or_default();
-        let span = source.start + start..source.start + start + line.len();
+        let length = line.char_indices().nth(40).map_or(line.len(), |(at, _)| at);
+        let span = source.start + start..source.start + start + length;
         let help = "remove it, or make it a comment: <!-- … -->".to_owned();
         self.error(span, format!("unexpected text `{}`", shorten(line)), Some(help));
     }
@@ -250,10 +257,14 @@ impl<'a> XmlLoader<'a> {
         let folder = substitute(&value.value, &self.parameters).replace('\\', "/");
         let span = value.span.clone();
         let near = file.parent().unwrap_or(Path::new("")).join(&folder);
-        let found = std::iter::once(near).chain(self.folders.iter().rev().map(|known| known.join(&folder)));
-        match found.into_iter().find(|folder| folder.is_dir()) {
-            Some(folder) => self.folders.push(folder),
-            None => self.error(span, format!("folder not found: {}", shorten(&folder)), None),
+        let others = self.folders.iter().rev().map(|known| known.join(&folder));
+        let candidates: Vec<PathBuf> = std::iter::once(near).chain(others).collect();
+        match candidates.iter().find(|folder| folder.is_dir()) {
+            Some(folder) => self.folders.push(folder.clone()),
+            None => {
+                candidates.into_iter().for_each(|folder| self.reader.watch_missing(folder));
+                self.error(span, format!("folder not found: {}", shorten(&folder)), None);
+            }
         }
     }
 

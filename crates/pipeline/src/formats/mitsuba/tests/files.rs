@@ -77,6 +77,14 @@ fn all_places_of_missing_includes_are_watched() {
 }
 
 #[test]
+fn all_places_of_missing_folders_are_watched() {
+    let bench = scene("<path value=\"p\"/><path value=\"q\"/>");
+    bench.write("p/other", "");
+    let paths = watched(&bench);
+    assert!(paths.contains(&bench.path("q")) && paths.contains(&bench.path("p/q")), "{paths:?}");
+}
+
+#[test]
 fn copied_files_have_different_names() {
     let names = ["a/t.obj", "b/t.obj", "t_2.obj", "c/t.obj"];
     let shape =

@@ -87,3 +87,17 @@ fn canceled_readers_add_nothing() {
         assert!(reader.document.to_toml().is_empty(), "{}", reader.document.to_toml());
     });
 }
+
+#[test]
+fn elements_have_limited_attributes_and_properties() {
+    let attributes: String = (0..100_000).map(|index| format!(" a{index}=\"\"")).collect();
+    let properties: String =
+        (0..100_000).map(|index| format!("<float name=\"p{index}\" value=\"1\"/>")).collect();
+    for (content, message) in [
+        (format!("<shape type=\"sphere\"{attributes}/>"), "the element has more than 200 attributes"),
+        (format!("<shape type=\"sphere\">{properties}</shape>"), "more than 1000 properties"),
+    ] {
+        let errors = scene(&content).read().expect_err(message);
+        assert_eq!((errors.len(), errors[0].message.as_str()), (1, message));
+    }
+}
