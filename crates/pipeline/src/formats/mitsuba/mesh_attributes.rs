@@ -69,6 +69,7 @@ impl<'a> SceneReader<'a> {
         let mut pending: Vec<ObjectIndex> =
             self.children_of_kind(object, ObjectKind::Bsdf).map(|child| child.target).collect();
         let (mut faces, mut others, mut colors, mut bsdfs) = (0, 0, 0, 0);
+        let mut visits = 0;
         while let Some(index) = pending.pop() {
             let inner = self.object(index);
             let is_texture = inner.kind == ObjectKind::Texture;
@@ -95,7 +96,9 @@ impl<'a> SceneReader<'a> {
                 }
                 pending.push(child.target);
             }
-            if pending.len() > 10_000 {
+            // References can lead to the same object on exponentially many paths.
+            visits += 1;
+            if visits > 10_000 {
                 return None;
             }
         }
