@@ -19,8 +19,9 @@ use crate::sampling::Dimension;
 use crate::scene::description::ShadowMode;
 use crate::world::SimdKernel;
 
-/// Samples all lights at the vertices in `used`.
-pub struct SampleAllLights<'a> {
+/// Samples all lights at the vertices in `used`. `MIS` is false if lights are found only by light samples, in
+/// which case no weights are computed.
+pub struct SampleAllLights<'a, const MIS: bool> {
     /// The tile being rendered.
     pub tile: &'a TileContext<'a>,
     /// The packet of vertices.
@@ -29,7 +30,7 @@ pub struct SampleAllLights<'a> {
     pub used: u32,
     /// The AOV to compute.
     pub aov: PathAov,
-    /// Technique that competes with light samples.
+    /// Technique that competes with light samples. Unused if `MIS` is false.
     pub competing: CompetingTechnique,
     /// Media at the vertices, or `None` if all vertices are in air.
     pub interior_lists: Option<&'a InteriorListPool>,
@@ -48,7 +49,7 @@ struct PendingLight {
     active: u32,
 }
 
-impl SimdKernel for SampleAllLights<'_> {
+impl<const MIS: bool> SimdKernel for SampleAllLights<'_, MIS> {
     type Output = LightSums;
 
     #[inline(always)]
@@ -59,15 +60,15 @@ impl SimdKernel for SampleAllLights<'_> {
     }
 }
 
-impl SampleAllLights<'_> {
+impl<const MIS: bool> SampleAllLights<'_, MIS> {
     /// Adds the reflected light from all lights.
     #[inline(always)]
     fn sample_all(&self, sums: &mut LightSums, simd: impl Simd) {
-        let (render, needs_weights) = (&self.tile.settings.render, self.competing.needs_weights());
+        let render = &self.tile.settings.render;
         let is_sampled = |light: &Light| !self.only_infinite || light.is_infinite();
         let mut sampler = None;
         for (number, light) in self.tile.world.lights.iter().filter(|(_, light)| is_sampled(light)) {
-            if needs_weights && self.tile.paths_find_sky && light.is_environment() {
+            if MIS && self.tile.paths_find_sky && light.is_environment() {
                 continue;
             }
             // If a single shadow ray determines the visibility of the whole light, defer the sum until the
@@ -103,7 +104,7 @@ impl SampleAllLights<'_> {
                 }
                 let mut fraction = self.splits_lobes.then(|| response.bsdf.wide_fraction());
                 // Apply the MIS weight, unless the light has no extent and is found only by light samples.
-                if needs_weights && !is_single {
+                if MIS && !is_single {
                     let leaves_gloss = self.tile.lobes_find_sky && light.is_environment();
                     let of_light = if leaves_gloss && self.competing.uses_glossy_lobe_rays() {
                         // Use a light-sampling pdf close to 0 so that lobe rays account for all of the light.

@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use super::all_lights::SampleAllLights;
 use super::light_sums::{LightSums, add_masked_lane_products, add_masked_lanes};
+use super::mis::CompetingTechnique;
 use super::shadow_rays::ShadowRayQueue;
 use crate::geometry::packet::set_bit_lanes;
 use crate::integrators::view::PathAov;
@@ -20,9 +21,9 @@ use crate::scene::description::ShadowMode;
 use crate::world::SimdKernel;
 
 /// Samples lights picked from a tree at a packet of vertices.
-pub struct SampleLightTree<'a> {
+pub struct SampleLightTree<'a, const MIS: bool> {
     /// The vertices, and how to sample light at them.
-    pub lighting: SampleAllLights<'a>,
+    pub lighting: SampleAllLights<'a, MIS>,
     /// The tree, and how to pick from it.
     pub selection: LightSampler<'a>,
     /// Index of the packet, which identifies the packet's shadow rays in the pool.
@@ -31,19 +32,32 @@ pub struct SampleLightTree<'a> {
     pub pool: &'a mut ShadowRayQueue,
 }
 
-impl SampleAllLights<'_> {
-    /// Samples the lights, or lights picked from the tree if there is one. Shadow rays to picked lights are
-    /// pooled under index `number`.
+impl SampleAllLights<'_, true> {
+    /// Samples the lights, or lights picked from the tree if there is one. Without a competing technique, no
+    /// weights are computed. Shadow rays to picked lights are pooled under index `number`.
     pub fn sample_all_or_picked_lights(self, number: u32, pool: &mut ShadowRayQueue) -> LightSums {
-        let (world, behavior) = (self.tile.world, &self.tile.behavior);
-        match world.lights.sampler_for_purpose(behavior.receivers) {
-            None => world.geometry.instruction_set().run(self),
-            Some(selection) => world.geometry.instruction_set().run(SampleLightTree {
-                lighting: self,
-                selection,
-                number,
-                pool,
-            }),
+        use CompetingTechnique::{Lobes, NarrowPaths, Nothing, Paths};
+        let Self { tile, row, used, aov, competing, interior_lists, only_infinite, splits_lobes } = self;
+        let plain = SampleAllLights::<false> {
+            tile,
+            row,
+            used,
+            aov,
+            competing,
+            interior_lists,
+            only_infinite,
+            splits_lobes,
+        };
+        let instructions = tile.world.geometry.instruction_set();
+        match (competing, tile.world.lights.sampler_for_purpose(tile.behavior.receivers)) {
+            (Nothing, None) => instructions.run(plain),
+            (Nothing, Some(selection)) => {
+                instructions.run(SampleLightTree { lighting: plain, selection, number, pool })
+            }
+            (Paths | NarrowPaths | Lobes(_), None) => instructions.run(self),
+            (Paths | NarrowPaths | Lobes(_), Some(selection)) => {
+                instructions.run(SampleLightTree { lighting: self, selection, number, pool })
+            }
         }
     }
 }
@@ -65,7 +79,7 @@ pub struct LightPicks {
 /// Number of samples for which lights are picked together.
 const PICK_BLOCK: u32 = 8;
 
-impl SimdKernel for SampleLightTree<'_> {
+impl<const MIS: bool> SimdKernel for SampleLightTree<'_, MIS> {
     type Output = LightSums;
 
     #[inline(always)]
@@ -139,7 +153,7 @@ impl LightPicks {
 /// Scale factor that appends the digits of a pair's second random number to the digits of the first.
 const LOW_DIGITS: f64 = 1.0 / (1 << 24) as f64;
 
-impl SampleAllLights<'_> {
+impl<const MIS: bool> SampleAllLights<'_, MIS> {
     /// Picks lights at each vertex for a range of samples.
     #[inline(always)]
     pub fn pick_lights(
@@ -179,7 +193,7 @@ impl SampleAllLights<'_> {
             self.pick_per_vertex_with_tree_cut(tree, way, &numbers, &mut picks);
         }
         for row in &mut picks {
-            row.invert_probabilities(count as f32, self.competing.needs_weights());
+            row.invert_probabilities(count as f32, MIS);
         }
         picks
     }
@@ -206,7 +220,7 @@ impl SampleAllLights<'_> {
         let Some(shares) = tree.importance_if_single_node(&glossy, row.bsdf.has_narrow_lobes(), simd) else {
             return;
         };
-        let without = (self.competing.needs_weights() && row.bsdf.has_narrow_lobes())
+        let without = (MIS && row.bsdf.has_narrow_lobes())
             .then(|| tree.importance_if_single_node(&plain, false, simd))
             .flatten();
         // Pick lights with each row of numbers.
@@ -235,9 +249,7 @@ impl SampleAllLights<'_> {
         picks: &mut [LightPicks],
     ) {
         let (row, group) = (self.row, way.count as usize);
-        let needs_weights = self.competing.needs_weights();
-        let mut cut = way.adaptive_tree_cut(tree);
-        let mut without = needs_weights.then(|| way.adaptive_tree_cut(tree));
+        let (mut cut, mut without) = (way.adaptive_tree_cut(tree), MIS.then(|| way.adaptive_tree_cut(tree)));
         for i in set_bit_lanes(self.used) {
             let plain = Receiver::with_unknown_lobe(lane(&row.from, i), lane(&row.normal, i));
             let lobe = self.receiver_lobe(i);
@@ -251,7 +263,7 @@ impl SampleAllLights<'_> {
                     let row = &mut picks[place];
                     row.lights[i] = light;
                     row.shares[i] = probability;
-                    if needs_weights {
+                    if MIS {
                         row.weighed[i] = without.map_or(probability, |without| without.probability(light));
                     }
                 });
@@ -300,7 +312,7 @@ impl SampleAllLights<'_> {
         let (mut values, active, response) = self.unoccluded_contributions(&samples, 1.0, simd);
         let active = active & used;
         let mut fraction = self.splits_lobes.then(|| response.bsdf.wide_fraction());
-        if self.competing.needs_weights() {
+        if MIS {
             let unweighted = values;
             // Each group of picks has its own pdf and competes with all requested BSDF samples.
             let competing = self.competing.bsdf_rays_per_light_sample(render.shadow_samples)

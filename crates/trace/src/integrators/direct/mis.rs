@@ -31,15 +31,6 @@ impl CompetingTechnique {
         if sharp == 0 { Self::Nothing } else { Self::Lobes(sharp) }
     }
 
-    /// Whether light samples need MIS weights.
-    #[inline(always)]
-    pub fn needs_weights(self) -> bool {
-        match self {
-            Self::Nothing => false,
-            Self::Paths | Self::NarrowPaths | Self::Lobes(_) => true,
-        }
-    }
-
     /// Whether the technique consists of rays in glossy lobes.
     pub fn uses_glossy_lobe_rays(self) -> bool {
         match self {

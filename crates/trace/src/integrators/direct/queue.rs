@@ -332,7 +332,7 @@ impl DirectLightVertexQueue {
         let row = &self.rows[request.number];
         let (competing, interior_lists) =
             (self.competing_technique(request, tile, aov), interiors_of_batch(&self.interior_lists, row));
-        let lighting = SampleAllLights {
+        let lighting = SampleAllLights::<true> {
             tile,
             row,
             used: request.used,

@@ -32,7 +32,7 @@ fn spiral(count: u32) -> ReferenceLight {
 /// Lighting at `row`, for picking lights with light sampling and MIS.
 fn picks_of(scene: &LitScene, row: &VertexBatch, samples: u32) -> (Vec<LightPicks>, u32) {
     let tile = scene.tile();
-    let lighting = SampleAllLights {
+    let lighting = SampleAllLights::<true> {
         tile: &tile,
         row,
         used: row.used,

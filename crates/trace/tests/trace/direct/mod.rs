@@ -180,7 +180,7 @@ impl LitScene {
     /// Light from light samples at a packet of vertices.
     pub fn sample_lights(&self, row: &VertexBatch, competing: CompetingTechnique) -> LightSums {
         let tile = &self.tile();
-        let lighting = SampleAllLights {
+        let lighting = SampleAllLights::<true> {
             tile,
             row,
             used: row.used,
