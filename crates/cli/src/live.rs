@@ -171,7 +171,7 @@ struct SharedWriteLog(Arc<Mutex<WriteLog>>);
 /// A log of written images.
 #[derive(Debug, Default)]
 struct WriteLog {
-    /// Lines about the images since the last write command, each with the number of its event.
+    /// Lines about images written since the last write command, each with its event number.
     lines: Vec<(u64, String)>,
     /// Number of events about written, failed, and refused images.
     results: u64,

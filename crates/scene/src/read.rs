@@ -271,7 +271,7 @@ mod tests {
     }
 
     #[test]
-    fn comments_of_other_formats_are_no_headers() {
+    fn comments_in_other_formats_are_not_headers() {
         let xml = "\u{feff}<scene>\n<!--\n[camera]\n-->\n</scene>";
         let cases = [
             ("a.xml", xml, false),

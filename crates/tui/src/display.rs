@@ -139,7 +139,7 @@ impl Display {
         self.images.is_some()
     }
 
-    /// Sets the preview to draw as pixels, or `None` if it is drawn as cells.
+    /// Sets the preview that is drawn as pixels. Pass `None` if the preview is drawn as cells.
     pub(super) fn set_pixel_preview(&mut self, wanted: Option<PlacedImage>, is_still: bool) {
         if let Some(uncovered) = self.images.as_mut().and_then(|images| images.set_target(wanted, is_still)) {
             self.painter.damage(uncovered);

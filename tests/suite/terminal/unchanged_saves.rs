@@ -1,5 +1,5 @@
-//! Saves that do not change the image, such as typos, corrections and comments, add no history entry and are
-//! ignored by comparisons.
+//! Saves that do not change the image, such as a typo that is corrected right away or a new comment, add no
+//! history entry and are ignored by comparisons.
 
 use glimt::tui::messages;
 

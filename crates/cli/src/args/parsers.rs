@@ -71,7 +71,7 @@ pub(super) fn number_override_parser(
 }
 
 /// Error message for `--error`.
-pub(super) const ERROR: &str = "expected a relative error, such as 0.02, or 0 to disable it";
+pub(super) const ERROR: &str = "expected a relative error, such as 0.02, or 0 for no target";
 /// Error message for `--clamp`.
 pub(super) const CLAMP: &str = "expected a radiance from 0 to 1e18 (0 disables the limit)";
 

@@ -108,8 +108,8 @@ fn tile_lumas_and_squared_error(pair: &ImagePair, tile: Rect) -> (f64, [Plane; 2
     (square, lumas)
 }
 
-/// Converts a coordinate in the tile with its margin to an image coordinate, or returns `None` if it is
-/// outside the image.
+/// Converts a coordinate in a tile padded by its margin to an image coordinate. Returns `None` if the result
+/// is outside the image.
 fn padded_tile_to_image_coordinate(start: u32, offset: usize, length: usize) -> Option<usize> {
     (start as usize + offset).checked_sub(RADIUS).filter(|&position| position < length)
 }

@@ -13,7 +13,7 @@ use nix::unistd::mkfifo;
 use super::*;
 use crate::system::machine::ProcessIdentity;
 
-/// Creates a temporary file as left by a killed process.
+/// Creates a temporary file like one left behind by a killed process.
 fn leave_stale_file(bench: &Bench) -> PathBuf {
     let mut child = process::Command::new("true").spawn().expect("`true` starts");
     child.wait().expect("`true` ends");

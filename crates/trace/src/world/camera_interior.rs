@@ -118,9 +118,9 @@ impl World {
         solids.into_iter().map(in_parts).collect()
     }
 
-    /// Glass material around a point, determined by the majority of rays cast from the point toward the
-    /// solid, or `None` if the point is outside or no ray hits the solid. If the point is on object `of`,
-    /// this object does not block the rays.
+    /// The glass material around a point, decided by a majority vote among rays cast from the point toward
+    /// the solid. Returns `None` if the point is outside the solid or no ray hits it. If the point is on
+    /// object `of`, that object does not block the rays.
     pub fn glass_material_around_point(
         &self,
         body: &CompoundSolid,

@@ -79,7 +79,7 @@ impl<'a> SceneReader<'a> {
             // Groups are added with their first instance.
             "shapegroup" => {
                 if target.depth > 0 {
-                    let text = "ignored; put an instance of it there";
+                    let text = "ignored here; use an instance of the group instead";
                     self.notes.note("a `shapegroup` in another shape", text, object.span.clone());
                 }
                 false
@@ -204,7 +204,7 @@ impl<'a> SceneReader<'a> {
         let is_readable =
             Path::new(name).extension().is_some_and(|ending| ending.eq_ignore_ascii_case(&object.plugin));
         if !is_readable {
-            let help = "use the plugin of the file's format: obj, ply, serialized or stl".to_owned();
+            let help = "use the plugin for the file's format: obj, ply, serialized or stl".to_owned();
             self.error(span, format!("`{0}` reads only .{0} files", object.plugin), Some(help));
             return false;
         }

@@ -1,5 +1,5 @@
-//! The Hosek–Wilkie sky and its sun. Radiances are spectral radiances in linear Rec. 709: a spectrally
-//! constant radiance of 1 W·m⁻²·sr⁻¹·nm⁻¹ has the luminance 1.
+//! The Hosek–Wilkie sky and its sun. All radiances are spectral, in linear Rec. 709: a spectrally
+//! constant radiance of 1 W·m⁻²·sr⁻¹·nm⁻¹ has a luminance of 1.
 //!
 //! | files | contents |
 //! | --- | --- |

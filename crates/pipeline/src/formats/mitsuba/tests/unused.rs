@@ -80,7 +80,7 @@ fn unused_objects_are_noted() {
         (
             r#"<shape type="shapegroup" id="g"><shape type="cube"/><shape type="shapegroup"/></shape>
             <shape type="instance"><ref id="g"/></shape>"#,
-            "a `shapegroup` in another shape: ignored; put an instance of it there",
+            "a `shapegroup` in another shape: ignored here; use an instance of the group instead",
         ),
         (r#"<scene><shape type="cube"/></scene>"#, "`scene` in `scene`: ignored"),
         (r#"<bsdf type="diffuse"/>"#, "`diffuse` in `scene`: ignored"),
