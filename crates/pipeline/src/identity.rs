@@ -61,7 +61,7 @@ impl ImageDependencies<'_> {
         add("seed", render.seed.to_string());
         add("depth of field", if dof { "on" } else { "off" }.to_owned());
         // All parts must have the same view. Checkpoints only need the same samples.
-        let sampled = if self.divided.is_some() { view } else { view.sampled_view() };
+        let sampled = if self.divided.is_some() { view } else { view.view_to_sample() };
         add("view", sampled.name().to_owned());
         add(
             "photons",

@@ -193,7 +193,7 @@ impl Display {
         if wanted.bar.is_some() {
             terminal::mark_progress_bar_used();
         }
-        bytes.extend(sent.update_sequence(wanted));
+        bytes.extend(sent.escape_sequence_to_change_to(wanted));
         bytes.append(&mut self.asides);
         self.window_titles[1] = self.window_titles[0].clone();
         if !bytes.is_empty() {

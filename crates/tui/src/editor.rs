@@ -10,7 +10,7 @@ use nix::sys::signal::Signal;
 use nix::sys::wait::{WaitPidFlag, WaitStatus, waitpid};
 use nix::unistd::Pid;
 
-use super::event::FilePosition;
+use super::event::FileLineColumn;
 use super::signals;
 
 /// Editor used if the environment does not specify one.
@@ -36,7 +36,7 @@ pub fn editor_and_variable(variable: impl Fn(&str) -> Option<String>) -> (String
 ///
 /// # Errors
 /// The editor could not be started or failed.
-pub(super) fn run(editor: &str, place: &FilePosition) -> Result<(), String> {
+pub(super) fn run(editor: &str, place: &FileLineColumn) -> Result<(), String> {
     let failed = |error: io::Error| format!("cannot start the editor `{editor}`: {error}");
     let mut shell = Command::new("/bin/sh");
     shell
@@ -85,8 +85,8 @@ fn exec_prefixed_shell_command_line(editor: &str) -> String {
 }
 
 /// Arguments that open the file at a position.
-fn position_arguments(editor: &str, place: &FilePosition) -> Vec<OsString> {
-    let FilePosition { path, line, column } = place;
+fn position_arguments(editor: &str, place: &FileLineColumn) -> Vec<OsString> {
+    let FileLineColumn { path, line, column } = place;
     // Prevent a file name with a leading dash from being parsed as an option.
     let path = if path.as_os_str().as_encoded_bytes().starts_with(b"-") {
         Path::new(".").join(path)
@@ -153,7 +153,7 @@ mod tests {
 
     #[test]
     fn editors_open_the_line() {
-        let place = FilePosition { path: "a b.toml".into(), line: 7, column: 3 };
+        let place = FileLineColumn { path: "a b.toml".into(), line: 7, column: 3 };
         for (editor, expected) in [
             ("vi", "+7 a b.toml"),
             ("/usr/bin/nvim -u NONE", "+7 a b.toml"),
@@ -165,7 +165,7 @@ mod tests {
         ] {
             assert_eq!(position_arguments(editor, &place).join(OsStr::new(" ")), expected, "{editor}");
         }
-        let dash = FilePosition { path: "-a.toml".into(), line: 1, column: 1 };
+        let dash = FileLineColumn { path: "-a.toml".into(), line: 1, column: 1 };
         assert_eq!(position_arguments("vi", &dash)[1], "./-a.toml");
     }
 }

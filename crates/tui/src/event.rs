@@ -167,7 +167,7 @@ pub(super) enum Effect {
     /// Enable or disable mouse reporting.
     Mouse(bool),
     /// Open the editor at this position.
-    Edit(FilePosition),
+    Edit(FileLineColumn),
     /// Query the window size.
     Measure,
     /// Send bytes after the preview: a notification or clipboard text.
@@ -178,7 +178,7 @@ pub(super) enum Effect {
 
 /// A position in a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct FilePosition {
+pub(super) struct FileLineColumn {
     pub path: PathBuf,
     /// Line number, counted from 1.
     pub line: usize,

@@ -9,7 +9,7 @@ use super::color::{self, ColorDepth};
 use super::display::{Display, TerminalEnvironment};
 use super::editor;
 use super::environment::{select_terminal_queries, terminal_environment_from_variables};
-use super::event::FilePosition;
+use super::event::FileLineColumn;
 use super::event::{Effect, Event};
 use super::event_queue::EventQueue;
 use super::exit_summary;
@@ -259,7 +259,7 @@ impl EventLoop {
     }
 
     /// Lets the editor use the terminal until it exits.
-    fn run_editor(&mut self, place: &FilePosition) -> Option<LoopEnd> {
+    fn run_editor(&mut self, place: &FileLineColumn) -> Option<LoopEnd> {
         self.leave_screen_and_await_replies();
         input::set_input_paused(true);
         self.screen.restore_terminal_temporarily();

@@ -74,7 +74,7 @@ impl TitleAndProgress {
     }
 
     /// Returns the bytes that change the title and progress bar from `self` to `to`.
-    pub(super) fn update_sequence(&self, to: &Self) -> Vec<u8> {
+    pub(super) fn escape_sequence_to_change_to(&self, to: &Self) -> Vec<u8> {
         let mut bytes = Vec::new();
         if let Some(title) = to.title.as_ref().filter(|_| self.title != to.title) {
             bytes.extend_from_slice(format!("\x1b]2;{}\x1b\\", escape_invisible_chars(title)).as_bytes());
@@ -145,7 +145,7 @@ mod tests {
 
     fn sent(before: &mut TitleAndProgress, ui: &TestUi, is_slow: bool) -> String {
         let now = TitleAndProgress::for_state(&ui.state, is_slow).unwrap_or_else(|| before.clone());
-        let bytes = before.update_sequence(&now);
+        let bytes = before.escape_sequence_to_change_to(&now);
         *before = now;
         String::from_utf8(bytes).expect("UTF-8")
     }

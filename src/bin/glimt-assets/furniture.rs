@@ -1,7 +1,7 @@
 //! Furniture for `scenes/furnished.toml` and `scenes/ajar.toml`. Units are meters. Each piece stands at the
 //! origin and faces +z.
 
-use super::parts::{ball, beveled_box, join, round_bar_along_path, solid_of_revolution, translate};
+use super::parts::{ball, beveled_box, join, round_bar_along_path, solid_of_revolution, translate_mesh};
 use super::surface::PolygonMesh;
 use super::vector::{Vector, sin_cos_turns};
 
@@ -340,6 +340,6 @@ fn bed() -> PolygonMesh {
         beveled_box([-0.47, 0.25, 0.98], [0.47, 0.45, 1.02], 0.008),
         beveled_box([-0.52, 0.24, -0.97], [-0.48, 0.34, 0.97], 0.006),
         beveled_box([0.48, 0.24, -0.97], [0.52, 0.34, 0.97], 0.006),
-        translate(beveled_box([-0.48, 0.0, -0.97], [0.48, 0.2, 0.97], 0.05), [0.0, 0.3, 0.0]),
+        translate_mesh(beveled_box([-0.48, 0.0, -0.97], [0.48, 0.2, 0.97], 0.05), [0.0, 0.3, 0.0]),
     ])
 }

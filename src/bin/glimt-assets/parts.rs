@@ -17,7 +17,7 @@ pub(crate) fn join(parts: impl IntoIterator<Item = PolygonMesh>) -> PolygonMesh 
 }
 
 /// Translates a surface.
-pub(crate) fn translate(surface: PolygonMesh, by: Vector) -> PolygonMesh {
+pub(crate) fn translate_mesh(surface: PolygonMesh, by: Vector) -> PolygonMesh {
     map_positions(surface, |position| add(position, by))
 }
 
@@ -143,5 +143,5 @@ pub(crate) fn round_bar_along_path(path: &[Vector], radius: f64, sides: u32) -> 
 
 /// A ball of 20 · 4^`times` triangles.
 pub(crate) fn ball(times: u32, center: Vector, radius: f64) -> PolygonMesh {
-    translate(displaced_icosphere(times, |_| radius), center)
+    translate_mesh(displaced_icosphere(times, |_| radius), center)
 }

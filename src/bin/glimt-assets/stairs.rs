@@ -2,7 +2,7 @@
 //! and placed by the scene. Flights and rails are at their final positions.
 
 use super::parts::{
-    ball, beveled_box, hexahedron, join, round_bar_along_path, solid_of_revolution, translate,
+    ball, beveled_box, hexahedron, join, round_bar_along_path, solid_of_revolution, translate_mesh,
 };
 use super::surface::PolygonMesh;
 use super::vector::{Vector, add, sin_cos_turns};
@@ -206,7 +206,7 @@ fn chandelier() -> PolygonMesh {
             [[0.0, 0.05], [0.02, 0.05], [0.05, 0.07], [0.05, 0.075], [0.02, 0.08], [0.02, 0.12], [0.0, 0.12]];
         join([
             round_bar_along_path(&path, 0.01, 6),
-            translate(solid_of_revolution(&holder, 12), [0.42 * cos, 0.0, 0.42 * sin]),
+            translate_mesh(solid_of_revolution(&holder, 12), [0.42 * cos, 0.0, 0.42 * sin]),
         ])
     };
     join([rod, hub].into_iter().chain((0..5).map(arm)))
@@ -242,7 +242,7 @@ fn picture_frame() -> PolygonMesh {
 fn console_table() -> PolygonMesh {
     let leg = |x: f64, z: f64| {
         let outline = [[0.0, 0.0], [0.015, 0.0], [0.02, 0.3], [0.024, 0.6], [0.024, 0.7], [0.0, 0.7]];
-        translate(solid_of_revolution(&outline, 10), [x, 0.0, z])
+        translate_mesh(solid_of_revolution(&outline, 10), [x, 0.0, z])
     };
     join([
         beveled_box([-0.55, 0.75, -0.18], [0.55, 0.78, 0.18], 0.008),

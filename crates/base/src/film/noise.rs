@@ -124,7 +124,7 @@ impl Film {
     pub fn half_cell_noise(&self, number: usize, half: usize) -> Option<CellHalfNoise> {
         let tile = self.lock_tile(number / CELLS);
         let (mut pixels, mut samples, mut sum) = (0_u32, u32::MAX, 0.0);
-        for pixel in self.half_cell_pixel_indices(number, half) {
+        for pixel in self.pixel_indices_in_noise_cell_half(number, half) {
             sum += luminance(tile.mean(pixel)?);
             samples = samples.min(tile.sample_count(pixel));
             pixels += 1;
@@ -201,12 +201,12 @@ impl Film {
 
     /// Number of pixels in one half of a cell.
     pub fn cell_half_pixel_count(&self, cell: usize, half: usize) -> usize {
-        self.cell_rect(cell).map_or(0, |rect| PixelSubset::Half(half).count(rect.area()))
+        self.noise_cell_rect(cell).map_or(0, |rect| PixelSubset::Half(half).count(rect.area()))
     }
 
     /// Tile-relative indices of the pixels in a half-cell.
-    fn half_cell_pixel_indices(&self, cell: usize, half: usize) -> impl Iterator<Item = usize> {
-        let (tile, rect) = (self.tile_rect(cell / CELLS), self.cell_rect(cell));
+    fn pixel_indices_in_noise_cell_half(&self, cell: usize, half: usize) -> impl Iterator<Item = usize> {
+        let (tile, rect) = (self.tile_rect(cell / CELLS), self.noise_cell_rect(cell));
         let part = PixelSubset::Half(half);
         tile.zip(rect).into_iter().flat_map(move |(tile, rect)| {
             let place = move |number| SelectedPixels { rect, part }.image_position(number);

@@ -152,7 +152,9 @@ impl Film {
 
     /// Samples per pixel in one half of a cell, or 0 if the half has no pixels.
     pub fn cell_half_samples_per_pixel(&self, cell: usize, half: usize) -> u32 {
-        let (Some(tile), Some(rect)) = (self.tile_rect(cell / CELLS), self.cell_rect(cell)) else { return 0 };
+        let (Some(tile), Some(rect)) = (self.tile_rect(cell / CELLS), self.noise_cell_rect(cell)) else {
+            return 0;
+        };
         if PixelSubset::Half(half).count(rect.area()) == 0 {
             return 0;
         }

@@ -328,8 +328,8 @@ impl Film {
     }
 
     /// Rectangle that a cell covers in the full image, or `None` if the cell has no pixels.
-    pub fn cell_rect(&self, cell: usize) -> Option<Rect> {
-        cell_rect(self.tile_rect(cell / CELLS)?, cell % CELLS)
+    pub fn noise_cell_rect(&self, cell: usize) -> Option<Rect> {
+        noise_cell_rect(self.tile_rect(cell / CELLS)?, cell % CELLS)
     }
 
     /// Indices of all tiles, in rings from the crop's center outward. Computed on the first call.
@@ -425,10 +425,10 @@ pub(super) fn pixel_index_in_rect(rect: Rect, x: u32, y: u32) -> Option<usize> {
 fn cell_and_rect_of_pixel(tile: Rect, x: u32, y: u32) -> (usize, Rect) {
     let (column, row) = ((x - tile.x) / CELL_SIZE, (y - tile.y) / CELL_SIZE);
     let cell = row as usize * CELLS_ACROSS + column as usize;
-    (cell, cell_rect(tile, cell).unwrap_or(tile))
+    (cell, noise_cell_rect(tile, cell).unwrap_or(tile))
 }
 
-fn cell_rect(tile: Rect, cell: usize) -> Option<Rect> {
+fn noise_cell_rect(tile: Rect, cell: usize) -> Option<Rect> {
     let (column, row) = ((cell % CELLS_ACROSS) as u32, (cell / CELLS_ACROSS) as u32);
     let (x, y) = (tile.x + column * CELL_SIZE, tile.y + row * CELL_SIZE);
     Rect { x, y, width: CELL_SIZE, height: CELL_SIZE }.intersection(&tile)

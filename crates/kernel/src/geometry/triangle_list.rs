@@ -170,7 +170,7 @@ impl TriangleList {
         found: &mut HitPacket,
         simd: impl Simd,
     ) -> u32 {
-        let candidates = self.find_nearest_candidates(rays, ends, &[NONE; PACKET_SIZE], simd);
+        let candidates = self.find_nearest_candidate_per_ray(rays, ends, &[NONE; PACKET_SIZE], simd);
         let NearestCandidateTestResults { hit, undecided, hits } =
             self.test_nearest_candidates(rays, &candidates, (active, ends), simd);
         select(&hit, &hits.t, &mut found.t);
@@ -190,7 +190,7 @@ impl TriangleList {
         except: &[u32; PACKET_SIZE],
         simd: impl Simd,
     ) -> [u32; 2] {
-        let candidates = self.find_nearest_candidates(rays, ends, except, simd);
+        let candidates = self.find_nearest_candidate_per_ray(rays, ends, except, simd);
         let mut may_hit = candidates.doubtful;
         for i in 0..PACKET_SIZE {
             may_hit[i] |= if candidates.near[i] < f32::INFINITY { TRUE } else { 0 };
@@ -205,7 +205,7 @@ impl TriangleList {
 
     /// Finds the nearest candidates. Excludes each ray's start triangle and its triangle in `except`.
     #[inline(always)]
-    fn find_nearest_candidates(
+    fn find_nearest_candidate_per_ray(
         &self,
         rays: &RayPacket,
         ends: &F32x16,

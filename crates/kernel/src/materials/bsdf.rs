@@ -3,7 +3,7 @@
 //!
 //! To add a kind of BSDF, add a file that implements [`Bxdf`](super::bxdf::Bxdf), and a line in the table in
 //! [`bxdfs`](super::bxdfs). If its parameters differ from those of all other kinds, also implement
-//! [`BxdfMaterial`] and [`BxdfParameters`]. No other code distinguishes kinds: integrators call `f`, `pdf`,
+//! [`SpatiallyVaryingBxdf`] and [`BxdfParameters`]. No other code distinguishes kinds: integrators call `f`, `pdf`,
 //! and `sample` of a [`BsdfPacket`](super::BsdfPacket) for all lanes at once.
 
 use std::f32::consts::FRAC_1_PI;
@@ -150,7 +150,7 @@ impl NarrowLobe {
 }
 
 /// A non-specular material with textures and parameters.
-pub trait BxdfMaterial {
+pub trait SpatiallyVaryingBxdf {
     /// The material at a single point.
     type Point: BxdfParameters;
 

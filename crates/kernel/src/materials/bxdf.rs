@@ -131,7 +131,7 @@ pub trait Bxdf: Soa + Default {
     fn new(point: &Self::Point, tangent: Vec3) -> Self;
 
     /// Replaces the color that
-    /// [`BxdfMaterial::color_to_look_up`](super::bsdf::BxdfMaterial::color_to_look_up) returns.
+    /// [`SpatiallyVaryingBxdf::color_to_look_up`](super::bsdf::SpatiallyVaryingBxdf::color_to_look_up) returns.
     /// Not called for materials without such a color.
     #[inline(always)]
     fn set_looked_up_color(&mut self, _point: &Self::Point, _color: Vec3) {}

@@ -1,8 +1,8 @@
 //! Sources of parameter values. A material lists its parameters once, in
-//! [`BxdfMaterial::look_up_parameters`], for texture lookups, for renders with white textures, and for
+//! [`SpatiallyVaryingBxdf::look_up_parameters`], for texture lookups, for renders with white textures, and for
 //! finding the textures that it uses.
 //!
-//! [`BxdfMaterial::look_up_parameters`]: super::bsdf::BxdfMaterial::look_up_parameters
+//! [`SpatiallyVaryingBxdf::look_up_parameters`]: super::bsdf::SpatiallyVaryingBxdf::look_up_parameters
 
 use std::sync::Arc;
 
@@ -53,9 +53,9 @@ impl ParameterLookup<'_> for PointTextureEvaluator<'_> {
 }
 
 /// Replaces all textures with white, except textures of the anisotropy, which are replaced with 0.
-pub struct WhiteLookup;
+pub struct WhiteTextureLookup;
 
-impl ParameterLookup<'_> for WhiteLookup {
+impl ParameterLookup<'_> for WhiteTextureLookup {
     #[inline(always)]
     fn color(&mut self, color: &ColorOrTexture) -> Vec3 {
         color.as_untextured().unwrap_or(Vec3::ONE)
@@ -72,7 +72,7 @@ impl ParameterLookup<'_> for WhiteLookup {
     }
 }
 
-/// Collects a material's textures. Returns the same values as [`WhiteLookup`].
+/// Collects a material's textures. Returns the same values as [`WhiteTextureLookup`].
 #[derive(Default)]
 pub struct MaterialTextureCollector<'m> {
     /// Textures of parameters that affect how the surface scatters light.
@@ -84,21 +84,21 @@ pub struct MaterialTextureCollector<'m> {
 impl<'m> ParameterLookup<'m> for MaterialTextureCollector<'m> {
     fn color(&mut self, color: &'m ColorOrTexture) -> Vec3 {
         self.scattering.extend(color.texture());
-        WhiteLookup.color(color)
+        WhiteTextureLookup.color(color)
     }
 
     fn number(&mut self, number: &'m ScalarParameter) -> f32 {
         self.scattering.extend(number.texture());
-        WhiteLookup.number(number)
+        WhiteTextureLookup.number(number)
     }
 
     fn number_neutral_at_zero(&mut self, number: &'m ScalarParameter) -> f32 {
         self.scattering.extend(number.texture());
-        WhiteLookup.number_neutral_at_zero(number)
+        WhiteTextureLookup.number_neutral_at_zero(number)
     }
 
     fn ambient_color(&mut self, color: &'m ColorOrTexture) -> Vec3 {
         self.ambient.extend(color.texture());
-        WhiteLookup.color(color)
+        WhiteTextureLookup.color(color)
     }
 }

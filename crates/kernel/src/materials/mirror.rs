@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::conductor::ConductorFresnel;
 use super::footprint::TexturePoint;
-use super::lookup::{MaterialTextureCollector, ParameterLookup, PointTextureEvaluator, WhiteLookup};
+use super::lookup::{MaterialTextureCollector, ParameterLookup, PointTextureEvaluator, WhiteTextureLookup};
 use super::texture::{ColorOrTexture, Texture};
 use crate::math::Vec3;
 
@@ -35,7 +35,9 @@ impl Mirror {
     pub fn reflectance_with_white_textures(&self, cosine: f32) -> Vec3 {
         match self {
             Self::Constant(color) => color.as_untextured().unwrap_or(Vec3::ONE),
-            Self::Conductor(fresnel) => fresnel.look_up_parameters(&mut WhiteLookup).reflectance(cosine),
+            Self::Conductor(fresnel) => {
+                fresnel.look_up_parameters(&mut WhiteTextureLookup).reflectance(cosine)
+            }
         }
     }
 

@@ -47,7 +47,7 @@ impl FileReader<'_> {
         for _ in 0..MAX_READS {
             let contents = FilesSeenByRequest::new(Arc::clone(self.contents));
             let containers = GltfContainers::default();
-            let files = self.context(&contents, &containers);
+            let files = self.file_read_context(&contents, &containers);
             let result = read(&mut SceneReadAttempt { files, table, findings });
             if result.is_err() && !self.token.is_canceled() {
                 contents.recheck_seen_files(self.token)?;
@@ -72,12 +72,12 @@ impl FileReader<'_> {
         read: impl FnOnce(&FileReadContext<'_>) -> Result<T, AbortReason>,
     ) -> Result<Option<T>, AbortReason> {
         let contents = FilesSeenByRequest::new(Arc::clone(self.contents));
-        let result = read(&self.context(&contents, &GltfContainers::default()))?;
+        let result = read(&self.file_read_context(&contents, &GltfContainers::default()))?;
         contents.recheck_seen_files(self.token)?;
         Ok(Some(result).filter(|_| contents.changed_file().is_none()))
     }
 
-    fn context<'a>(
+    fn file_read_context<'a>(
         &'a self,
         contents: &'a FilesSeenByRequest,
         containers: &'a GltfContainers,

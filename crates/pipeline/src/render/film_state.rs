@@ -104,8 +104,9 @@ impl FilmState {
         let film_cells = film.noise_cell_count();
         let goals = CellSampleGoals::new_undecided(film_cells);
         let own = share.as_ref().map(|share| share.tile_mask(film.tile_count()));
-        let is_own = |cell: usize| own.as_ref().is_none_or(|own| own[cell / CELLS]);
-        let none = |cell| if film.cell_rect(cell).is_some() && is_own(cell) { [0; 2] } else { [u32::MAX; 2] };
+        let is_own = |cell| own.as_ref().is_none_or(|own| own[cell / CELLS]);
+        let exists = |cell| film.noise_cell_rect(cell).is_some();
+        let none = |cell: usize| if exists(cell) && is_own(cell) { [0; 2] } else { [u32::MAX; 2] };
         let done = (0..film.noise_cell_count()).map(none).collect();
         Ok(Self {
             key,
@@ -228,10 +229,8 @@ impl FilmState {
             + size_of_val(self.costs.as_slice())
             + self.goals.memory_bytes()
             + self.expected.memory_bytes();
-        self.film.memory_bytes()
-            + cells as u64
-            + base
-            + self.previewer.as_ref().map_or(0, Previewer::memory_bytes)
+        let previewer = self.previewer.as_ref().map_or(0, Previewer::memory_bytes);
+        self.film.memory_bytes() + cells as u64 + base + previewer
     }
 
     /// Returns the jobs that render both halves of every cell in `part` (`None` for all) up to `target` or
@@ -247,7 +246,7 @@ impl FilmState {
         };
         for &tile in self.film.tiles_center_outward().iter().filter(is_wanted) {
             let cells = (CELLS * tile..CELLS * (tile + 1))
-                .filter_map(|cell| Some((cell, self.film.cell_rect(cell)?)));
+                .filter_map(|cell| Some((cell, self.film.noise_cell_rect(cell)?)));
             let cells = cells.map(|(cell, rect)| (rect, [0, 1].map(|half| missing(cell, half))));
             let cells: Vec<(Rect, [Range<u32>; 2])> = cells.collect();
             let job = |pixels, samples: &Range<u32>| TileJob { tile, pixels, samples: samples.clone() };
@@ -275,8 +274,8 @@ impl FilmState {
     pub(crate) fn record_job(&mut self, job: &TileJob, cost: &TraceCost) -> u64 {
         let (rays, seconds) = (cost.rays.total_rays(), cost.seconds / job.pixels.rect.area() as f64);
         for cell in CELLS * job.tile..CELLS * (job.tile + 1) {
-            let rect = self.film.cell_rect(cell);
-            if let Some(rect) = rect.filter(|rect| rect.intersection(&job.pixels.rect) == Some(*rect)) {
+            let cell_rect = self.film.noise_cell_rect(cell);
+            if let Some(rect) = cell_rect.filter(|rect| rect.intersection(&job.pixels.rect) == Some(*rect)) {
                 self.rays[cell] += rays * rect.area() as u64 / job.pixels.rect.area() as u64;
                 let seconds = seconds * rect.area() as f64;
                 self.seconds += seconds;
@@ -326,7 +325,7 @@ impl FilmState {
     pub(crate) fn remaining_cpu_seconds(&self, most: u32, jobs: impl Fn(u32, u32) -> u32) -> f64 {
         let (mut seconds, mut known, mut worth, mut others) = (0.0, 0.0, 0.0, 0.0);
         let is_there =
-            |cell: &usize| self.is_tile_in_shard(cell / CELLS) && self.film.cell_rect(*cell).is_some();
+            |cell: &usize| self.is_tile_in_shard(cell / CELLS) && self.film.noise_cell_rect(*cell).is_some();
         for cell in (0..self.done.len()).filter(is_there) {
             let remaining_samples = |half: usize| {
                 let (done, end) = (self.done[cell][half], self.expected_cell_half_samples(cell, half, most));

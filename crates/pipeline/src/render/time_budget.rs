@@ -92,7 +92,7 @@ fn half_cells_with_costs(
     most: u32,
 ) -> Option<Vec<HalfCell>> {
     let mut halves = Vec::with_capacity(2 * done.len());
-    for (cell, done) in done.iter().enumerate().filter(|(cell, _)| film.cell_rect(*cell).is_some()) {
+    for (cell, done) in done.iter().enumerate().filter(|(cell, _)| film.noise_cell_rect(*cell).is_some()) {
         let errors = [0, 1].map(|half| film.cell_half_relmse_and_exponent(cell, half, known));
         let units: f64 = [0, 1]
             .map(|half| film.cell_half_pixel_count(cell, half) as f64 * f64::from(done[half]))
@@ -133,7 +133,7 @@ mod tests {
 
     /// Adds samples to one half of a cell.
     fn add(film: &Film, (cell, half): (usize, usize), samples: u32, mut sample: impl FnMut() -> f32) {
-        let rect = film.cell_rect(cell).expect("a cell");
+        let rect = film.noise_cell_rect(cell).expect("a cell");
         let pixels = SelectedPixels { rect, part: PixelSubset::Half(half) };
         let radiance = (0..pixels.count() as u32 * samples).map(|_| Vec3::splat(sample())).collect();
         film.add_samples(
@@ -158,7 +158,7 @@ mod tests {
 
     /// Returns the cells that have pixels, from left to right.
     fn cells(film: &Film) -> Vec<usize> {
-        (0..film.noise_cell_count()).filter(|cell| film.cell_rect(*cell).is_some()).collect()
+        (0..film.noise_cell_count()).filter(|cell| film.noise_cell_rect(*cell).is_some()).collect()
     }
 
     /// Returns the goals for the next round, for the film's cells from left to right.

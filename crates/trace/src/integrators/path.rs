@@ -81,7 +81,7 @@ pub fn trace_camera_paths(
         }
     }
     paths.shade_queued_vertices()?;
-    paths.direct.accumulate_light_of_consecutive_slots(slots.start, &mut paths.accumulator);
+    paths.direct.accumulate_arrived_light_from_slot(slots.start, &mut paths.accumulator);
     paths.start_next_bounce(rays);
     // Trace the remaining bounces.
     while !rays.is_empty() {
@@ -203,7 +203,7 @@ impl CameraPathWavefront<'_, '_> {
                 let before = self.next.len();
                 BsdfSampler { tile, row, used: row.used, continuation, has_fractions }.queue_scattered_paths(
                     self.direct.interior_lists(),
-                    self.direct.cones_by_queue_index(),
+                    self.direct.cones_by_path_index(),
                     self.next,
                     fractions,
                 );

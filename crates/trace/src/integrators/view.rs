@@ -80,7 +80,7 @@ impl ViewMode {
 
 impl ViewMode {
     /// View whose samples are used to compute this view.
-    pub fn sampled_view(self) -> Self {
+    pub fn view_to_sample(self) -> Self {
         match self.aov_source() {
             AovSource::Film(FilmQuantity::Radiance | FilmQuantity::Samples | FilmQuantity::Error) => {
                 Self::Beauty

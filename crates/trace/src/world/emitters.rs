@@ -15,7 +15,7 @@ use crate::lights::infinite::sky::sun::OrientedSunDisk;
 use crate::lights::infinite::sky::{Sky, SkyFrame};
 use crate::lights::infinite::{DirectionalLight, Environment, EnvironmentMap, MapOrientation, MapRows};
 use crate::lights::{
-    AreaLight, BlendWeight, BoundingSphere, EmissionModulation, EmissionTerm, Light, LightBounds, Lights,
+    AreaLight, BlendPartWeight, BoundingSphere, EmissionModulation, EmissionTerm, Light, LightBounds, Lights,
     PhotonEmitter, Side, TriangleWithUvs, UvMapping, back_area_light, front_area_light,
     see_through_shape_side_light,
 };
@@ -163,12 +163,12 @@ impl SurfaceEmission {
         scene: &Scene,
         images: &Images,
         material: &description::Material,
-        weights: &[BlendWeight],
+        weights: &[BlendPartWeight],
     ) {
         if let MaterialKind::Blend { weight, parts } = &material.kind {
             let second = lower_blend_weight(scene, images, material, weight);
             for (part, is_second) in parts.iter().zip([false, true]) {
-                let weight = BlendWeight { second: second.clone(), is_second };
+                let weight = BlendPartWeight { second: second.clone(), is_second };
                 self.add_material(scene, images, part, &[weights, &[weight]].concat());
             }
         } else {
@@ -178,12 +178,12 @@ impl SurfaceEmission {
     }
 
     /// Adds the emission of a material that is not a blend. Constant factors become part of the radiance.
-    fn add_term(&mut self, emission: Emission, opacity: Option<Opacity>, weights: &[BlendWeight]) {
+    fn add_term(&mut self, emission: Emission, opacity: Option<Opacity>, weights: &[BlendPartWeight]) {
         self.is_sheer |= opacity.is_some();
         let Emission { mut scale, texture, sides, coat } = emission;
         scale *= opacity.as_ref().and_then(Opacity::as_untextured).unwrap_or(1.0);
         let opacity = opacity.filter(|opacity| opacity.as_untextured().is_none());
-        let (constant, weights): (Vec<BlendWeight>, Vec<_>) =
+        let (constant, weights): (Vec<BlendPartWeight>, Vec<_>) =
             weights.iter().cloned().partition(|weight| weight.second.as_untextured().is_some());
         for weight in constant {
             scale *= weight.part_weight_from_second(weight.second.as_untextured().unwrap_or(1.0));

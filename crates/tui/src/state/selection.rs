@@ -1,6 +1,6 @@
 //! State of the mouse, the crosshair and the inspected object.
 
-use crate::event::FilePosition;
+use crate::event::FileLineColumn;
 use crate::pipeline::protocol::NormalizedPosition;
 
 /// A left button press on the image.
@@ -40,7 +40,7 @@ pub(crate) struct PointerState {
     /// Values inspected by the last click, on one line.
     pub clicked: Option<String>,
     /// Where the inspected object is defined in the scene file.
-    pub picked: Option<FilePosition>,
+    pub picked: Option<FileLineColumn>,
 }
 
 impl PointerState {

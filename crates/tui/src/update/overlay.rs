@@ -22,7 +22,7 @@ pub(super) fn handle_key(state: &mut State, key: KeyPress) -> Option<Vec<Effect>
         return Some(select_view_and_open_list(state, view));
     }
     let action = keymap::overlay_action_for_key(key)?;
-    if let Some(effects) = views::handle_view_list_action(state, action) {
+    if let Some(effects) = views::handle_view_mode_list_action(state, action) {
         return Some(effects);
     }
     perform_action(state, action).then(Vec::new)

@@ -2,7 +2,7 @@
 
 use super::notices::{only_show_until_key, show_keyboard_change_notice, show_notice, show_notice_only};
 use super::{camera, history, overlay, region};
-use crate::event::FilePosition;
+use crate::event::FileLineColumn;
 use crate::event::{Effect, MouseEvent, MouseEventKind};
 use crate::keymap::OverlayAction;
 use crate::math::decimal::{decimal_step_for_distance, round_to_step};
@@ -148,7 +148,7 @@ pub(super) fn handle_pick_reply(state: &mut State, picked: &PickedPixel) -> Vec<
     state.selection.picked = picked
         .object
         .as_ref()
-        .and_then(|object| Some(FilePosition { path: object.path.clone(), line: object.line?, column: 1 }));
+        .and_then(|object| Some(FileLineColumn { path: object.path.clone(), line: object.line?, column: 1 }));
     match (state.selection.purpose, &picked.object) {
         (PickPurpose::Inspect, _) => {
             state.overlays.message = None;

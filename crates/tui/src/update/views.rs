@@ -14,7 +14,7 @@ use crate::view::views::views_per_column;
 
 /// Handles an overlay action, or returns `None` if the list is closed, covered by the help or does not use
 /// the action.
-pub(super) fn handle_view_list_action(state: &mut State, action: OverlayAction) -> Option<Vec<Effect>> {
+pub(super) fn handle_view_mode_list_action(state: &mut State, action: OverlayAction) -> Option<Vec<Effect>> {
     if state.overlays.views.is_none() || state.overlays.help.open {
         return None;
     }

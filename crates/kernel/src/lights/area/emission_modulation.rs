@@ -36,19 +36,19 @@ pub struct EmissionTerm {
     /// Clear coat.
     pub coat: Option<Arc<Coat>>,
     /// Varying weights of the blends that contain the term.
-    pub weights: Vec<BlendWeight>,
+    pub weights: Vec<BlendPartWeight>,
 }
 
 /// Weight of one part of a blend.
 #[derive(Clone, Debug, PartialEq)]
-pub struct BlendWeight {
+pub struct BlendPartWeight {
     /// Weight of the second part.
     pub second: ScalarParameter,
     /// Whether this is the weight of the second part.
     pub is_second: bool,
 }
 
-impl BlendWeight {
+impl BlendPartWeight {
     /// Weight of this part, given the weight `second` of the second part.
     pub fn part_weight_from_second(&self, second: f32) -> f32 {
         let second = second.clamp(0.0, 1.0);

@@ -22,7 +22,9 @@ pub mod torus;
 pub mod transformed;
 pub mod triangle;
 
-pub use emission_modulation::{BlendWeight, EmissionModulation, EmissionTerm, TriangleWithUvs, UvMapping};
+pub use emission_modulation::{
+    BlendPartWeight, EmissionModulation, EmissionTerm, TriangleWithUvs, UvMapping,
+};
 pub use mesh::MeshEmitter;
 pub use sample_point::SampledLightPoint;
 

@@ -110,8 +110,8 @@ impl PhotonTargets {
 
     /// The targets seen from an emission point.
     #[inline]
-    pub fn view_from<'a>(&self, from: DVec3, sends: &'a EmissionProfile<'a>) -> VisibleTargets<'a> {
-        let mut view = VisibleTargets { sends, seen: ArrayVec::new(), total: 0.0 };
+    pub fn view_from<'a>(&self, from: DVec3, sends: &'a EmissionProfile<'a>) -> TargetsSeenFromPoint<'a> {
+        let mut view = TargetsSeenFromPoint { sends, seen: ArrayVec::new(), total: 0.0 };
         for ball in &self.balls {
             let cone = TargetCone::from_sphere(ball, from);
             let weight = match &cone {
@@ -122,7 +122,7 @@ impl PhotonTargets {
             };
             if weight > 0.0 {
                 view.total += weight;
-                view.seen.push(VisibleTarget { cone, weight });
+                view.seen.push(TargetSeenFromPoint { cone, weight });
             }
         }
         view
@@ -130,22 +130,22 @@ impl PhotonTargets {
 }
 
 /// Targets seen from an emission point.
-pub struct VisibleTargets<'a> {
+pub struct TargetsSeenFromPoint<'a> {
     sends: &'a EmissionProfile<'a>,
     /// Targets that the light can reach.
-    seen: ArrayVec<VisibleTarget, MAX_TARGETS>,
+    seen: ArrayVec<TargetSeenFromPoint, MAX_TARGETS>,
     total: f64,
 }
 
 /// A single target seen from an emission point.
-struct VisibleTarget {
+struct TargetSeenFromPoint {
     /// The cone of directions to the target, or `None` if the point is inside the target.
     cone: Option<TargetCone>,
     /// Upper bound on the power that the target receives, relative to the peak intensity, in sr.
     weight: f64,
 }
 
-impl VisibleTargets<'_> {
+impl TargetsSeenFromPoint<'_> {
     /// Upper bound on the total power that the targets receive, relative to the peak intensity, in sr.
     pub fn total_power_bound(&self) -> f64 {
         self.total
@@ -176,7 +176,7 @@ impl VisibleTargets<'_> {
             return 1.0;
         }
         let (mut by_cones, mut by_others) = (0.0, 0.0);
-        for (number, VisibleTarget { cone, weight }) in self.seen.iter().enumerate() {
+        for (number, TargetSeenFromPoint { cone, weight }) in self.seen.iter().enumerate() {
             match cone {
                 // At the edge of a cone, the result of `contains` depends on rounding.
                 Some(cone) if made_for == Some(number) || cone.contains(direction) => {

@@ -28,12 +28,12 @@ pub use translucent::TranslucentPhong;
 use std::sync::Arc;
 
 use crate::materials::bsdf::{
-    BsdfValues, BxdfMaterial, BxdfParameters, LobesToSample, NarrowLobe, ShownLobes, UvPacket,
+    BsdfValues, BxdfParameters, LobesToSample, NarrowLobe, ShownLobes, SpatiallyVaryingBxdf, UvPacket,
 };
 use crate::materials::bxdf::{Bxdf, ShadingGeometry, lobe_shading_normal};
 use crate::materials::bxdf_packet::BxdfPacket;
 use crate::materials::footprint::TexturePoint;
-use crate::materials::lookup::{MaterialTextureCollector, PointTextureEvaluator, WhiteLookup};
+use crate::materials::lookup::{MaterialTextureCollector, PointTextureEvaluator, WhiteTextureLookup};
 use crate::materials::texture::{ColorOrTexture, Texture};
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, Mask, Simd, Vec3x16};
@@ -97,7 +97,7 @@ macro_rules! kinds {
             /// The material with white textures.
             #[inline]
             pub fn with_white_textures(&self) -> BxdfPoint {
-                match self { $(Self::$kind(material) => BxdfPoint::$kind(material.look_up_parameters(&mut WhiteLookup))),+ }
+                match self { $(Self::$kind(material) => BxdfPoint::$kind(material.look_up_parameters(&mut WhiteTextureLookup))),+ }
             }
 
             /// The material's main color. Counts texture lookups in `lookups`.
@@ -121,19 +121,19 @@ macro_rules! kinds {
                 textures
             }
 
-            /// [`BxdfMaterial::color_to_look_up`].
+            /// [`SpatiallyVaryingBxdf::color_to_look_up`].
             #[inline]
             fn packet_color_parameter(&self) -> Option<&ColorOrTexture> {
                 match self { $(Self::$kind(material) => material.color_to_look_up()),+ }
             }
 
-            /// [`BxdfMaterial::is_anisotropic`].
+            /// [`SpatiallyVaryingBxdf::is_anisotropic`].
             #[inline]
             pub fn is_anisotropic(&self) -> bool {
                 match self { $(Self::$kind(material) => material.is_anisotropic()),+ }
             }
 
-            /// [`BxdfMaterial::is_transmissive`].
+            /// [`SpatiallyVaryingBxdf::is_transmissive`].
             pub fn is_transmissive(&self) -> bool {
                 match self { $(Self::$kind(material) => material.is_transmissive()),+ }
             }
@@ -260,7 +260,7 @@ macro_rules! kinds {
                 match self {
                     $(Self::$kind(row) => {
                         let NonSpecular::$kind(material) = material else { return 0 };
-                        let point = material.look_up_parameters(&mut WhiteLookup);
+                        let point = material.look_up_parameters(&mut WhiteTextureLookup);
                         row.evaluate_material_into_lanes_out_of_line(&point, colors.as_ref(), shown, simd)
                     })+
                     $(Self::$part(_) => 0),+

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::lexer::{PbrtError, PbrtResult};
 use super::memo;
-use super::scene::SceneWriter;
+use super::scene::PbrtConverter;
 use super::texture_nodes::{ImageFilter, ImageNode, ImageWrap, TextureNode, UvMapping};
 use super::textures::{PbrtTextureUse, push_mapping};
 use crate::assets::image::{ColorEncoding, ColorTransferFunction, ImageLimits, load_and_hash};
@@ -40,7 +40,7 @@ struct Domain {
     wrap: ImageWrap,
 }
 
-impl SceneWriter<'_> {
+impl PbrtConverter<'_> {
     /// Converts a texture of pbrt's roughness to glimt's, which is the square root of α.
     pub(super) fn roughness_node(&mut self, node: TextureNode, is_remapped: bool) -> TextureNode {
         TextureNode::Power(node.into(), if is_remapped { 0.25 } else { 0.5 })

@@ -4,7 +4,7 @@ use super::colors::SpectrumUse;
 use super::lexer::{PbrtError, PbrtResult};
 use super::material_tables::{Emission, ShapeProperties};
 use super::parameters::Parameters;
-use super::scene::SceneWriter;
+use super::scene::PbrtConverter;
 use super::shapes::round_shape_area;
 use super::state::{Entity, ShapeEntity};
 use super::texture_nodes::{ImageFilter, ImageNode, ImageWrap, TextureNode, TextureValue, UvMapping};
@@ -22,7 +22,7 @@ struct AreaLight {
     mean: f64,
 }
 
-impl SceneWriter<'_> {
+impl PbrtConverter<'_> {
     /// Reads the properties that belong to shapes in pbrt, and to materials in glimt. Returns `None` if the
     /// shape is invisible and does not emit light.
     pub(super) fn shape_properties(

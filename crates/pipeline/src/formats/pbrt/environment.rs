@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::lexer::{PbrtError, PbrtResult};
 use super::memo;
 use super::parameters::Text;
-use super::scene::SceneWriter;
+use super::scene::PbrtConverter;
 use crate::assets::image::{ColorEncoding, ImageLimits, load_and_hash};
 use crate::assets::{Companion, FileHash};
 use crate::control::ignore_progress;
@@ -57,9 +57,9 @@ struct Map {
     hash: FileHash,
 }
 
-impl SceneWriter<'_> {
+impl PbrtConverter<'_> {
     /// Writes the `[environment]` table.
-    pub(super) fn write_environment(&mut self, lights: &InfiniteLights) -> PbrtResult<()> {
+    pub(super) fn convert_environment(&mut self, lights: &InfiniteLights) -> PbrtResult<()> {
         if lights.images.is_empty() {
             if lights.color != DVec3::ZERO {
                 self.document.start_table("environment");

@@ -6,7 +6,7 @@ use super::colors::SpectrumUse;
 use super::environment::{InfiniteImage, InfiniteLights};
 use super::lexer::{PbrtError, PbrtResult};
 use super::parameters::ParameterType;
-use super::scene::SceneWriter;
+use super::scene::PbrtConverter;
 use super::state::PlacedEntity;
 use crate::formats::rounding::shorten_color;
 use crate::math::{DMat4, DVec3};
@@ -14,19 +14,19 @@ use crate::scene::nearest::nearest_name;
 
 const LIGHTS: [&str; 6] = ["point", "spot", "distant", "infinite", "goniometric", "projection"];
 
-impl SceneWriter<'_> {
+impl PbrtConverter<'_> {
     /// Writes all lights.
-    pub(super) fn write_lights(&mut self) {
+    pub(super) fn convert_lights(&mut self) {
         let mut infinite = InfiniteLights::default();
         for light in &self.statements.lights {
-            let written = self.write_light(light, &mut infinite);
+            let written = self.convert_light(light, &mut infinite);
             self.attempt(written);
         }
-        let written = self.write_environment(&infinite);
+        let written = self.convert_environment(&infinite);
         self.attempt(written);
     }
 
-    fn write_light(&mut self, light: &PlacedEntity, infinite: &mut InfiniteLights) -> PbrtResult<()> {
+    fn convert_light(&mut self, light: &PlacedEntity, infinite: &mut InfiniteLights) -> PbrtResult<()> {
         let (entity, span) = (&light.entity, light.entity.span());
         let matrix = self.still_transform(light.transform, span.clone());
         let kind = &*entity.kind.text;
@@ -35,15 +35,15 @@ impl SceneWriter<'_> {
         }
         self.document.set_span_for_next_values(span.clone());
         match kind {
-            "point" => self.write_point(light, &matrix)?,
-            "spot" => self.write_spot(light, &matrix)?,
-            "distant" => self.write_distant(light, &matrix)?,
+            "point" => self.convert_point(light, &matrix)?,
+            "spot" => self.convert_spot(light, &matrix)?,
+            "distant" => self.convert_distant(light, &matrix)?,
             "infinite" => self.read_infinite(light, &matrix, infinite)?,
             "goniometric" => {
                 let text = "a point light with the same intensity in every direction is used";
                 self.notes.substitute_light("light `goniometric`", text, span);
                 entity.parameters.ignore(&["filename"]);
-                self.write_point(light, &matrix)?;
+                self.convert_point(light, &matrix)?;
             }
             "projection" => {
                 self.notes.substitute_light("light `projection`", "skipped", span);
@@ -73,7 +73,7 @@ impl SceneWriter<'_> {
         Ok(color.unwrap_or(DVec3::ONE) * scale)
     }
 
-    fn write_point(&mut self, light: &PlacedEntity, matrix: &DMat4) -> PbrtResult<()> {
+    fn convert_point(&mut self, light: &PlacedEntity, matrix: &DMat4) -> PbrtResult<()> {
         let from = light.entity.parameters.triple("from", ParameterType::Point3, DVec3::ZERO)?;
         let intensity = self.scaled_color(light, ["I", "power"], 4.0 * PI)?;
         self.document.start_list_table("light");
@@ -83,7 +83,7 @@ impl SceneWriter<'_> {
         Ok(())
     }
 
-    fn write_spot(&mut self, light: &PlacedEntity, matrix: &DMat4) -> PbrtResult<()> {
+    fn convert_spot(&mut self, light: &PlacedEntity, matrix: &DMat4) -> PbrtResult<()> {
         let parameters = &light.entity.parameters;
         let from = parameters.triple("from", ParameterType::Point3, DVec3::ZERO)?;
         let to = parameters.triple("to", ParameterType::Point3, DVec3::Z)?;
@@ -115,7 +115,7 @@ impl SceneWriter<'_> {
         Ok(())
     }
 
-    fn write_distant(&mut self, light: &PlacedEntity, matrix: &DMat4) -> PbrtResult<()> {
+    fn convert_distant(&mut self, light: &PlacedEntity, matrix: &DMat4) -> PbrtResult<()> {
         let parameters = &light.entity.parameters;
         let from = parameters.triple("from", ParameterType::Point3, DVec3::ZERO)?;
         let to = parameters.triple("to", ParameterType::Point3, DVec3::Z)?;

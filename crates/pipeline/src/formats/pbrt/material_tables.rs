@@ -2,7 +2,7 @@
 
 use super::lexer::{PbrtError, PbrtResult};
 use super::materials::{BlendPart, MaterialModel};
-use super::scene::{LoweredMaterial, SceneWriter};
+use super::scene::{LoweredMaterial, PbrtConverter};
 use super::state::{Entity, MaterialReference};
 use super::texture_nodes::TextureNode;
 use super::textures::{PbrtTextureUse, texture_value};
@@ -34,7 +34,7 @@ pub(super) struct ShapeProperties {
     pub(super) tint: Option<DVec3>,
 }
 
-impl SceneWriter<'_> {
+impl PbrtConverter<'_> {
     /// Returns the material of a shape, adding its table if it is new.
     pub(super) fn material(
         &mut self,
@@ -53,7 +53,7 @@ impl SceneWriter<'_> {
     }
 
     /// Finds the statement that defines a material. Also returns a name for its table.
-    fn find_material(
+    fn resolve_material(
         &self,
         reference: &MaterialReference,
         span: &Range<usize>,
@@ -89,7 +89,7 @@ impl SceneWriter<'_> {
             let message = "this material contains itself, or mixes are nested too deeply";
             return Err(PbrtError::new(span.clone(), message));
         }
-        let (entity, name) = self.find_material(reference, span)?;
+        let (entity, name) = self.resolve_material(reference, span)?;
         let (entity, is_named) = (entity.clone(), matches!(reference, MaterialReference::Named(_)));
         let model = self.read_material(&entity, is_named)?;
         self.document.set_span_for_next_values(entity.span());

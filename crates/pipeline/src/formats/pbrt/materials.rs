@@ -3,7 +3,7 @@
 use super::colors::SpectrumUse;
 use super::lexer::{PbrtError, PbrtResult};
 use super::parameters::{Parameters, Text};
-use super::scene::SceneWriter;
+use super::scene::PbrtConverter;
 use super::state::{ColorSpace, Entity};
 use super::texture_nodes::{ImageFilter, ImageNode, ImageWrap, TextureNode, TextureValue, UvMapping};
 use super::textures::PbrtTextureUse;
@@ -73,14 +73,14 @@ enum Roughness {
 
 /// Reads the parameters of a material.
 struct MaterialReader<'w, 'a> {
-    writer: &'w mut SceneWriter<'a>,
+    writer: &'w mut PbrtConverter<'a>,
     parameters: &'w Parameters,
     space: ColorSpace,
     keys: TableEntries,
     needs_uv: bool,
 }
 
-impl SceneWriter<'_> {
+impl PbrtConverter<'_> {
     /// Reads a material. Named materials have their type in a parameter.
     pub(super) fn read_material(&mut self, entity: &Entity, is_named: bool) -> PbrtResult<MaterialModel> {
         let parameters = &entity.parameters;
@@ -145,7 +145,7 @@ impl MaterialReader<'_, '_> {
 
     /// Reads a parameter that may be a texture or a constant.
     fn node(&mut self, name: &'static str, value: TextureValue) -> PbrtResult<Option<TextureNode>> {
-        let SceneWriter { resolver, notes, .. } = &mut *self.writer;
+        let PbrtConverter { resolver, notes, .. } = &mut *self.writer;
         let node = resolver.parameter(self.parameters, name, value, self.space, notes)?;
         self.needs_uv |= node.as_ref().is_some_and(|node| node.as_constant().is_none());
         Ok(node)

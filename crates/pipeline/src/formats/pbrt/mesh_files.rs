@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::lexer::{PbrtError, PbrtResult};
 use super::parameters::{Parameters, Text};
-use super::scene::SceneWriter;
+use super::scene::PbrtConverter;
 use super::shapes::Placement;
 use crate::assets::mesh::{load, load_from_bytes};
 use crate::assets::{AssetError, Companion, LoadedMesh, read_gzip_file};
@@ -29,10 +29,10 @@ struct MeshHeader {
     size: u64,
 }
 
-impl SceneWriter<'_> {
+impl PbrtConverter<'_> {
     /// Writes a `plymesh`. Its file is loaded later, with all other assets, unless the importer must
     /// decompress or change the mesh.
-    pub(super) fn write_mesh_file(
+    pub(super) fn convert_mesh_file(
         &mut self,
         parameters: &Parameters,
         placement: &Placement<'_>,
@@ -70,7 +70,7 @@ impl SceneWriter<'_> {
                 Some(data)
                     if is_compressed || placement.emits || placement.needs_uv && data.uvs.is_empty() =>
                 {
-                    self.write_mesh_data(data, &stem(&file.text), placement);
+                    self.convert_mesh_data(data, &stem(&file.text), placement);
                     return Ok(());
                 }
                 Some(_) => {}

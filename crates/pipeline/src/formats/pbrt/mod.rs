@@ -32,7 +32,7 @@ use std::path::{Path, PathBuf};
 use self::colors::ColorReader;
 use self::lexer::PbrtError;
 use self::parser::Parser;
-use self::scene::{AssetLocation, SceneWriter};
+use self::scene::{AssetLocation, PbrtConverter};
 use self::texture_nodes::TextureResolver;
 use super::foreign::ForeignError;
 use super::foreign::import::{CopiedFile, check_scene_before_import, read_copied_files};
@@ -76,7 +76,7 @@ fn read_scene(
     }
     let SourceReader { files, hash, mut companions, .. } = sources;
     let colors = ColorReader::new(path.parent().unwrap_or(Path::new("")), context.token);
-    let mut writer = SceneWriter::new(
+    let mut writer = PbrtConverter::new(
         &statements,
         TextureResolver::new(&statements, &colors),
         SceneDocumentBuilder::from_files(files.clone()),
@@ -86,7 +86,7 @@ fn read_scene(
     );
     writer.write_all();
     context.token.check_pause_and_cancel()?;
-    let SceneWriter { document, notes, errors, assets, companions: read, .. } = writer;
+    let PbrtConverter { document, notes, errors, assets, companions: read, .. } = writer;
     companions.extend(read);
     companions.append(&mut colors.companions.borrow_mut());
     if !errors.is_empty() {

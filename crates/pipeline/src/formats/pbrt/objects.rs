@@ -3,19 +3,19 @@
 use std::collections::HashMap;
 
 use super::lexer::PbrtError;
-use super::scene::SceneWriter;
+use super::scene::PbrtConverter;
 use crate::formats::foreign::transform::{is_invertible_affine, matrix_value};
 use crate::formats::model::UsedNames;
 use crate::math::DMat4;
 use crate::scene::nearest::nearest_name;
 use crate::scene::sanitize::escape_and_truncate;
 
-impl SceneWriter<'_> {
+impl PbrtConverter<'_> {
     /// Writes all shapes, objects and instances.
-    pub(super) fn write_objects(&mut self) {
+    pub(super) fn convert_objects(&mut self) {
         let statements = self.statements;
         for shape in &statements.shapes {
-            self.write_shape(shape, None);
+            self.convert_shape(shape, None);
             if self.has_too_many_errors() || self.token.is_canceled() {
                 return;
             }
@@ -32,7 +32,7 @@ impl SceneWriter<'_> {
             self.document.set_span_for_next_values(object.name.span.clone());
             self.document.start_named_table("groups", &name);
             for shape in &object.shapes {
-                self.write_shape(shape, Some(&name));
+                self.convert_shape(shape, Some(&name));
                 if self.has_too_many_errors() || self.token.is_canceled() {
                     return;
                 }

@@ -88,7 +88,7 @@ pub(super) enum LoweredMaterial {
 }
 
 /// Writes the scene document.
-pub(super) struct SceneWriter<'a> {
+pub(super) struct PbrtConverter<'a> {
     pub(super) statements: &'a Statements,
     pub(super) resolver: TextureResolver<'a>,
     pub(super) document: SceneDocumentBuilder,
@@ -107,7 +107,7 @@ pub(super) struct SceneWriter<'a> {
     generated_names: HashMap<[u8; 32], String>,
 }
 
-impl<'a> SceneWriter<'a> {
+impl<'a> PbrtConverter<'a> {
     pub(super) fn new(
         statements: &'a Statements,
         resolver: TextureResolver<'a>,
@@ -138,10 +138,10 @@ impl<'a> SceneWriter<'a> {
     pub(super) fn write_all(&mut self) {
         let file = self.assets.file.clone();
         self.document.add_comment_above_next_table(format!("{file}, as glimt shows it."));
-        let is_rendered = self.write_settings_and_camera();
+        let is_rendered = self.convert_settings_and_camera();
         self.attempt(is_rendered);
-        self.write_lights();
-        self.write_objects();
+        self.convert_lights();
+        self.convert_objects();
     }
 
     /// Records the error of a failed operation, or returns the result of a successful one.

@@ -2,7 +2,7 @@
 
 use super::lexer::{PbrtError, PbrtResult};
 use super::parameters::{ParameterType, Parameters};
-use super::scene::SceneWriter;
+use super::scene::PbrtConverter;
 use super::state::{Entity, PlacedEntity};
 use crate::formats::foreign::transform::{is_mirroring, linear_part};
 use crate::math::{DMat3, DMat4, DVec2, DVec3};
@@ -17,8 +17,8 @@ struct Film {
     gain: f64,
 }
 
-impl SceneWriter<'_> {
-    pub(super) fn write_settings_and_camera(&mut self) -> PbrtResult<()> {
+impl PbrtConverter<'_> {
+    pub(super) fn convert_settings_and_camera(&mut self) -> PbrtResult<()> {
         let statements = self.statements;
         let film = match &statements.film {
             Some(film) => self.read_film(film)?,
@@ -31,14 +31,14 @@ impl SceneWriter<'_> {
         self.document.start_table("render");
         self.document.set("width", (film.crop[2] - film.crop[0]) as f64);
         self.document.set("height", (film.crop[3] - film.crop[1]) as f64);
-        self.write_sampler()?;
-        self.write_integrator()?;
-        self.write_filter()?;
+        self.convert_sampler()?;
+        self.convert_integrator()?;
+        self.convert_filter()?;
         let gain = film.gain * exposure;
         if gain != 1.0 {
             self.document.set("gain", gain);
         }
-        self.write_camera(&film)
+        self.convert_camera(&film)
     }
 
     fn read_film(&mut self, film: &Entity) -> PbrtResult<Film> {
@@ -72,7 +72,7 @@ impl SceneWriter<'_> {
         Ok(Film { size: [width, height], crop, gain })
     }
 
-    fn write_sampler(&mut self) -> PbrtResult<()> {
+    fn convert_sampler(&mut self) -> PbrtResult<()> {
         let Some(sampler) = &self.statements.sampler else {
             self.document.set("samples", 16.0);
             return Ok(());
@@ -100,7 +100,7 @@ impl SceneWriter<'_> {
         Ok(())
     }
 
-    fn write_integrator(&mut self) -> PbrtResult<()> {
+    fn convert_integrator(&mut self) -> PbrtResult<()> {
         let Some(integrator) = &self.statements.integrator else {
             self.document.set("integrator", "path");
             self.document.set("max_depth", 5.0);
@@ -112,7 +112,7 @@ impl SceneWriter<'_> {
             ["path", "volpath", "bdpt", "mlt", "simplepath", "simplevolpath", "randomwalk", "lightpath"];
         self.document.set_span_for_next_values(integrator.span());
         match kind {
-            "sppm" => self.write_photons(parameters)?,
+            "sppm" => self.convert_photons(parameters)?,
             "ao" | "function" => {
                 let text = "path tracing is used instead";
                 self.notes.substitute_light(&format!("integrator `{kind}`"), text, integrator.span());
@@ -164,7 +164,7 @@ impl SceneWriter<'_> {
         parameters.check_all_used()
     }
 
-    fn write_photons(&mut self, parameters: &Parameters) -> PbrtResult<()> {
+    fn convert_photons(&mut self, parameters: &Parameters) -> PbrtResult<()> {
         let count = parameters.integer("photonsperiteration", -1, -1..=i64::from(i32::MAX))?;
         let radius = parameters.positive_float("radius", 1.0)?;
         self.document.set("integrator", "whitted");
@@ -178,7 +178,7 @@ impl SceneWriter<'_> {
         Ok(())
     }
 
-    fn write_filter(&mut self) -> PbrtResult<()> {
+    fn convert_filter(&mut self) -> PbrtResult<()> {
         let Some(filter) = &self.statements.filter else {
             self.document.set("filter", "gaussian");
             return Ok(());
@@ -221,10 +221,10 @@ impl SceneWriter<'_> {
         Ok(())
     }
 
-    fn write_camera(&mut self, film: &Film) -> PbrtResult<()> {
+    fn convert_camera(&mut self, film: &Film) -> PbrtResult<()> {
         self.document.start_table("camera");
         let Some(camera) = &self.statements.camera else {
-            return self.write_view(DMat4::IDENTITY, film, &Lens::PINHOLE, "perspective", 90.0, None);
+            return self.convert_view(DMat4::IDENTITY, film, &Lens::PINHOLE, "perspective", 90.0, None);
         };
         let PlacedEntity { entity, transform } = camera;
         let (parameters, span) = (&entity.parameters, entity.span());
@@ -269,7 +269,7 @@ impl SceneWriter<'_> {
         parameters.ignore(&["shutteropen", "shutterclose", "mapping"]);
         parameters.check_all_used()?;
         let kind = if kind == "spherical" { "panorama" } else { kind };
-        self.write_view(matrix, film, &lens, kind, fov, Some(window))
+        self.convert_view(matrix, film, &lens, kind, fov, Some(window))
     }
 
     /// Returns the screen window [x0, x1, y0, y1] of the whole film. For a field of view of 90 degrees, it is
@@ -305,7 +305,7 @@ impl SceneWriter<'_> {
     }
 
     /// Writes the camera's keys. `matrix` transforms from the camera to the world.
-    fn write_view(
+    fn convert_view(
         &mut self,
         matrix: DMat4,
         film: &Film,

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::lexer::{PbrtError, PbrtResult};
 use super::parameters::Parameters;
-use super::scene::{LoweredMaterial, SceneWriter};
+use super::scene::{LoweredMaterial, PbrtConverter};
 use super::state::ShapeEntity;
 use crate::formats::foreign::meshes::MeshData;
 use crate::formats::foreign::transform::{is_invertible_affine, matrix_value, similarity_scale};
@@ -46,14 +46,14 @@ struct Round {
     azimuth: f64,
 }
 
-impl SceneWriter<'_> {
+impl PbrtConverter<'_> {
     /// Writes a shape. `group` is the group that contains it.
-    pub(super) fn write_shape(&mut self, shape: &ShapeEntity, group: Option<&str>) {
-        let written = self.try_write_shape(shape, group);
+    pub(super) fn convert_shape(&mut self, shape: &ShapeEntity, group: Option<&str>) {
+        let written = self.try_convert_shape(shape, group);
         self.attempt(written);
     }
 
-    fn try_write_shape(&mut self, shape: &ShapeEntity, group: Option<&str>) -> PbrtResult<()> {
+    fn try_convert_shape(&mut self, shape: &ShapeEntity, group: Option<&str>) -> PbrtResult<()> {
         let entity = &shape.placed.entity;
         let (kind, span) = (&*entity.kind.text, entity.span());
         if kind == "curve" {
@@ -102,10 +102,10 @@ impl SceneWriter<'_> {
             span,
         };
         match (kind, data) {
-            ("loopsubdiv", Some(data)) => self.write_subdivided(data, &entity.parameters, &placement)?,
-            (_, Some(data)) => self.write_mesh_data(data, kind, &placement),
-            ("plymesh", None) => self.write_mesh_file(&entity.parameters, &placement)?,
-            (_, None) => self.write_round(kind, &entity.parameters, &placement)?,
+            ("loopsubdiv", Some(data)) => self.convert_subdivided(data, &entity.parameters, &placement)?,
+            (_, Some(data)) => self.convert_mesh_data(data, kind, &placement),
+            ("plymesh", None) => self.convert_mesh_file(&entity.parameters, &placement)?,
+            (_, None) => self.convert_round(kind, &entity.parameters, &placement)?,
         }
         entity.parameters.check_all_used()
     }
@@ -115,7 +115,7 @@ impl SceneWriter<'_> {
         parameters.ignore(&["alpha", "P", "N", "uv", "indices"]);
     }
 
-    fn begin_shape(&mut self, table: &'static str, placement: &Placement<'_>) {
+    fn start_shape_table(&mut self, table: &'static str, placement: &Placement<'_>) {
         self.document.set_span_for_next_values(placement.span.clone());
         match placement.group {
             Some(group) => self.document.group_list_table(group, table),
@@ -131,7 +131,7 @@ impl SceneWriter<'_> {
     }
 
     /// Writes a mesh that exists only in memory.
-    pub(super) fn write_mesh_data(&mut self, mut data: MeshData, stem: &str, placement: &Placement<'_>) {
+    pub(super) fn convert_mesh_data(&mut self, mut data: MeshData, stem: &str, placement: &Placement<'_>) {
         data.drop_degenerate_triangles();
         if data.triangles.is_empty() {
             self.notes.note("a mesh without area", "skipped", placement.span.clone());
@@ -142,7 +142,7 @@ impl SceneWriter<'_> {
             data.add_default_uvs();
         }
         let name = self.add_generated_file(stem, "ply", data.encode());
-        self.begin_shape("mesh", placement);
+        self.start_shape_table("mesh", placement);
         self.document.set("file", name);
         if data.normals.is_empty() {
             self.document.set("smooth", false);
@@ -150,7 +150,7 @@ impl SceneWriter<'_> {
         self.set_matrix(&placement.matrix);
     }
 
-    fn write_subdivided(
+    fn convert_subdivided(
         &mut self,
         mut data: MeshData,
         parameters: &Parameters,
@@ -178,7 +178,7 @@ impl SceneWriter<'_> {
         }
         data.orient(placement.is_reversed);
         let name = self.add_generated_file("loopsubdiv", "ply", data.encode());
-        self.begin_shape("mesh", placement);
+        self.start_shape_table("mesh", placement);
         self.document.set("file", name);
         self.document.set("subdivide", levels.min(most) as f64);
         self.set_matrix(&placement.matrix);
@@ -186,7 +186,7 @@ impl SceneWriter<'_> {
     }
 
     /// Writes a sphere, a disk or a cylinder.
-    fn write_round(
+    fn convert_round(
         &mut self,
         kind: &str,
         parameters: &Parameters,
@@ -207,13 +207,13 @@ impl SceneWriter<'_> {
                 let text = "a mesh with 128 cells around the axis is used";
                 self.notes.note(&format!("a partial `{kind}`"), text, placement.span.clone());
             }
-            self.write_mesh_data(mesh, kind, placement);
+            self.convert_mesh_data(mesh, kind, placement);
             return Ok(());
         }
         match kind {
-            "sphere" => self.write_sphere(round.radius, placement),
+            "sphere" => self.convert_sphere(round.radius, placement),
             "disk" => {
-                self.begin_shape("disk", placement);
+                self.start_shape_table("disk", placement);
                 self.document.set("center", [0.0, 0.0, round.z[0]]);
                 let normal = if placement.is_reversed { -1.0 } else { 1.0 };
                 self.document.set("normal", [0.0, 0.0, normal]);
@@ -221,7 +221,7 @@ impl SceneWriter<'_> {
                 self.set_matrix(&placement.matrix);
             }
             _ => {
-                self.begin_shape("cylinder", placement);
+                self.start_shape_table("cylinder", placement);
                 self.document.set("a", [0.0, 0.0, round.z[0]]);
                 self.document.set("b", [0.0, 0.0, round.z[1]]);
                 self.document.set("radius", round.radius);
@@ -232,8 +232,8 @@ impl SceneWriter<'_> {
         Ok(())
     }
 
-    fn write_sphere(&mut self, radius: f64, placement: &Placement<'_>) {
-        self.begin_shape("sphere", placement);
+    fn convert_sphere(&mut self, radius: f64, placement: &Placement<'_>) {
+        self.start_shape_table("sphere", placement);
         match similarity_scale(&placement.matrix).filter(|_| !placement.needs_uv) {
             Some(scale) => {
                 self.document.set("center", placement.matrix.w_axis.truncate());

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::scene::SceneWriter;
+use super::scene::PbrtConverter;
 use super::texture_nodes::{ImageFilter, ImageNode, ImageWrap, TextureNode, UvMapping};
 use crate::formats::foreign::import::TableEntries;
 use crate::formats::rounding::shorten_color;
@@ -19,7 +19,7 @@ pub(super) enum PbrtTextureUse {
     Normal,
 }
 
-impl SceneWriter<'_> {
+impl PbrtConverter<'_> {
     /// Returns the value of a color key: a color or a texture reference.
     pub(super) fn color_value(&mut self, node: &TextureNode) -> BuiltValue {
         let node = &self.without_missing_images(node);

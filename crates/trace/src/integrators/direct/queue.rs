@@ -111,7 +111,7 @@ impl DirectLightVertexQueue {
     }
 
     /// Like [`DirectLightVertexQueue::accumulate_arrived_light`], for paths with consecutive slots.
-    pub fn accumulate_light_of_consecutive_slots(&mut self, first: u32, accumulator: &mut Accumulator<'_>) {
+    pub fn accumulate_arrived_light_from_slot(&mut self, first: u32, accumulator: &mut Accumulator<'_>) {
         accumulator.add_direct_to_consecutive_slots(first, &self.arrived, &self.arrived_diffuse);
     }
 
@@ -232,7 +232,7 @@ impl DirectLightVertexQueue {
     }
 
     /// Ray cones at the vertices, indexed by queue index. Empty if ray cones are not used.
-    pub fn cones_by_queue_index(&self) -> &[RayCone] {
+    pub fn cones_by_path_index(&self) -> &[RayCone] {
         &self.cones
     }
 

@@ -42,7 +42,7 @@ impl<'a> PathStepper<'a> for CameraPathWavefront<'a, '_> {
     }
 
     #[inline(always)]
-    fn handle_walk_end(&mut self, path: &PathRay, reached: Interaction<'_, 'a>, has_passed: bool) {
+    fn handle_interaction(&mut self, path: &PathRay, reached: Interaction<'_, 'a>, has_passed: bool) {
         match reached {
             Interaction::Opaque(vertex, hit, far) => {
                 if !has_passed && matches!(hit, OpaqueSurfaceHit::Direct(_)) {

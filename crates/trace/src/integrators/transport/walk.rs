@@ -55,12 +55,12 @@ pub trait PathStepper<'a> {
     /// Handles the interaction that ends a walk. The path contains the incoming ray, in the medium before the
     /// surface, and its throughput includes absorption. `has_passed` is true if the walk crossed any surface
     /// inside glass.
-    fn handle_walk_end(&mut self, path: &PathRay, reached: Interaction<'_, 'a>, has_passed: bool);
+    fn handle_interaction(&mut self, path: &PathRay, reached: Interaction<'_, 'a>, has_passed: bool);
 
     /// Texture lookup counter.
     fn texture_lookup_counter(&mut self) -> &mut u64;
 
-    /// Handles a thin pane. The path has the same state as in [`PathStepper::handle_walk_end`].
+    /// Handles a thin pane. The path has the same state as in [`PathStepper::handle_interaction`].
     fn handle_pane(
         &mut self,
         path: &PathRay,
@@ -145,10 +145,10 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
         let has_passed = hidden > 0;
         let Some(hit) = next else {
             way.move_origin_to_last_vertex(path);
-            return stepper.handle_walk_end(path, Interaction::Nothing, has_passed);
+            return stepper.handle_interaction(path, Interaction::Nothing, has_passed);
         };
         if hidden == MAX_PASSED_SURFACES {
-            return stepper.handle_walk_end(path, Interaction::Hidden, true);
+            return stepper.handle_interaction(path, Interaction::Hidden, true);
         }
         let mut vertex = match surface.take() {
             Some(surface) => SurfaceVertex::from_computed_surface(tile, path, &hit, surface),
@@ -186,7 +186,7 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
                 vertex.set_offset_points(crossing.sides);
             }
             let hit = way.rebase_ray_to_last_vertex(path, hit);
-            return stepper.handle_walk_end(
+            return stepper.handle_interaction(
                 path,
                 Interaction::Opaque(&vertex, OpaqueSurfaceHit::Direct(hit), &far),
                 has_passed,
@@ -208,7 +208,7 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
                 let touched = Hit { shape: ShapeHit { t: hit.shape.t, ..touching.shape }, ..touching };
                 let touched = way.rebase_ray_to_last_vertex(path, touched);
                 let reached = Interaction::Opaque(&vertex, OpaqueSurfaceHit::Touching(touched), &far);
-                return stepper.handle_walk_end(path, reached, has_passed);
+                return stepper.handle_interaction(path, reached, has_passed);
             }
             path.path = path.continuation_path_number(PASSED);
         }
@@ -223,7 +223,7 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
                 None
             };
             let hit = way.rebase_ray_to_last_vertex(path, hit);
-            return stepper.handle_walk_end(
+            return stepper.handle_interaction(
                 path,
                 Interaction::Glass(&vertex, hit, Interface { far: &far, rough }),
                 has_passed,

@@ -2,7 +2,7 @@
 
 mod bxdf;
 
-use crate::materials::bsdf::{BxdfMaterial, BxdfParameters};
+use crate::materials::bsdf::{BxdfParameters, SpatiallyVaryingBxdf};
 use crate::materials::coat::{Coat, CoatPoint};
 use crate::materials::lookup::ParameterLookup;
 use crate::math::Vec3;
@@ -26,7 +26,7 @@ pub struct CoatedPoint<P> {
     pub base: P,
 }
 
-impl<M: BxdfMaterial> BxdfMaterial for CoatedMaterial<M> {
+impl<M: SpatiallyVaryingBxdf> SpatiallyVaryingBxdf for CoatedMaterial<M> {
     type Point = CoatedPoint<M::Point>;
 
     #[inline]

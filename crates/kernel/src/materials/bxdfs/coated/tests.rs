@@ -11,7 +11,7 @@ use crate::materials::bxdfs::lobe_tests::{
 use crate::materials::bxdfs::reference_tests::reference_microfacet_brdf;
 use crate::materials::coat::CoatInputs;
 use crate::materials::conductor::{ConductorBxdf, ConductorPoint, FresnelPoint};
-use crate::materials::lookup::WhiteLookup;
+use crate::materials::lookup::WhiteTextureLookup;
 use crate::materials::microfacet::MicrofacetDistribution;
 use crate::materials::phong::{PhongBsdf, PhongBxdf};
 use crate::materials::plastic::{PlasticBxdf, PlasticPoint};
@@ -31,7 +31,7 @@ const TINT: Vec3 = Vec3::new(0.9, 0.6, 0.2);
 fn coated<P>(base: P, weight: f32, alpha: f32, ior: f32, tint: Vec3) -> CoatedPoint<P> {
     let [weight, roughness] = [weight, alpha.sqrt()].map(ScalarParameter::Constant);
     let inputs = CoatInputs { weight, roughness, ior, tint: ColorOrTexture::Constant(tint) };
-    let coat = Coat::new(inputs).expect("a coat").look_up_parameters(&mut WhiteLookup);
+    let coat = Coat::new(inputs).expect("a coat").look_up_parameters(&mut WhiteTextureLookup);
     CoatedPoint { coat, base }
 }
 
@@ -47,7 +47,7 @@ fn conductor(alphas: [f32; 2]) -> ConductorPoint {
 fn plastic(alpha: f32) -> PlasticPoint {
     let [diffuse, specular] = [RED, Vec3::ONE].map(ColorOrTexture::Constant);
     Plastic::new(diffuse, specular, ScalarParameter::Constant(alpha.sqrt()), 1.4, MicrofacetDistribution::Ggx)
-        .look_up_parameters(&mut WhiteLookup)
+        .look_up_parameters(&mut WhiteTextureLookup)
 }
 
 fn principled(color: Vec3, metallic: f32, transmission: f32, alpha: f32) -> PrincipledPoint {
@@ -62,7 +62,7 @@ fn principled(color: Vec3, metallic: f32, transmission: f32, alpha: f32) -> Prin
         transmission: number(transmission),
         diffuse_transmission: ColorOrTexture::Constant(Vec3::ZERO),
     };
-    Principled::new(inputs).look_up_parameters(&mut WhiteLookup)
+    Principled::new(inputs).look_up_parameters(&mut WhiteTextureLookup)
 }
 
 fn translucent(diffuse: Vec3, specular: f32, transmission: Vec3) -> TranslucentPoint {

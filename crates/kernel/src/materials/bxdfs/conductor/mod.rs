@@ -3,7 +3,7 @@
 mod bxdf;
 pub mod elements;
 
-use crate::materials::bsdf::{BxdfMaterial, BxdfParameters};
+use crate::materials::bsdf::{BxdfParameters, SpatiallyVaryingBxdf};
 use crate::materials::fresnel::{conductor, schlick_weight};
 use crate::materials::lookup::ParameterLookup;
 use crate::materials::microfacet;
@@ -100,7 +100,7 @@ fn reflectance(first: f32, second: f32, cosine: f32, weight: f32) -> f32 {
     if second < 0.0 { approximate } else { exact }
 }
 
-impl BxdfMaterial for Conductor {
+impl SpatiallyVaryingBxdf for Conductor {
     type Point = ConductorPoint;
 
     #[inline]

@@ -6,7 +6,7 @@ pub mod lobes;
 
 use std::f32::consts::{FRAC_1_PI, PI};
 
-use crate::materials::bsdf::{BxdfMaterial, BxdfParameters};
+use crate::materials::bsdf::{BxdfParameters, SpatiallyVaryingBxdf};
 use crate::materials::lookup::ParameterLookup;
 use crate::materials::texture::ColorOrTexture;
 #[cfg(test)]
@@ -43,7 +43,7 @@ pub struct PhongBsdf {
     pub ambient: Vec3,
 }
 
-impl BxdfMaterial for Phong {
+impl SpatiallyVaryingBxdf for Phong {
     type Point = PhongBsdf;
 
     #[inline(always)]

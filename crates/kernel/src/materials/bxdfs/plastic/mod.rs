@@ -8,7 +8,7 @@ mod bxdf;
 
 use std::f32::consts::FRAC_1_PI;
 
-use crate::materials::bsdf::{BxdfMaterial, BxdfParameters};
+use crate::materials::bsdf::{BxdfParameters, SpatiallyVaryingBxdf};
 use crate::materials::lobe_albedo::{
     AlbedoTable, LobeAlbedoPolynomial, fresnel_dielectric_f64, reflectance_under_coat,
 };
@@ -99,7 +99,7 @@ fn base_layer_f(diffuse: Vec3, ior: f32, coat: &LobeAlbedoPolynomial, is_linear:
     reflected * (FRAC_1_PI / squared)
 }
 
-impl BxdfMaterial for Plastic {
+impl SpatiallyVaryingBxdf for Plastic {
     type Point = PlasticPoint;
 
     #[inline(always)]

@@ -8,7 +8,7 @@ use crate::materials::bxdfs::lobe_tests::{
     spherical_direction,
 };
 use crate::materials::bxdfs::reference_tests::{reference_beckmann_brdf, reference_microfacet_brdf};
-use crate::materials::lookup::WhiteLookup;
+use crate::materials::lookup::WhiteTextureLookup;
 use crate::math::DVec3;
 
 fn plastic(diffuse: Vec3, specular: f32, ior: f32, alpha: f32) -> Plastic {
@@ -31,7 +31,7 @@ fn with_distribution(
 }
 
 fn point(plastic: &Plastic) -> PlasticPoint {
-    plastic.look_up_parameters(&mut WhiteLookup)
+    plastic.look_up_parameters(&mut WhiteTextureLookup)
 }
 
 const RED: Vec3 = Vec3::new(0.7, 0.1, 0.05);

@@ -16,7 +16,7 @@ mod bxdf;
 
 use std::f32::consts::FRAC_1_PI;
 
-use crate::materials::bsdf::{BxdfMaterial, BxdfParameters};
+use crate::materials::bsdf::{BxdfParameters, SpatiallyVaryingBxdf};
 use crate::materials::lookup::ParameterLookup;
 use crate::materials::microfacet;
 use crate::materials::scalar::ScalarParameter;
@@ -97,7 +97,7 @@ impl Principled {
     }
 }
 
-impl BxdfMaterial for Principled {
+impl SpatiallyVaryingBxdf for Principled {
     type Point = PrincipledPoint;
 
     #[inline]

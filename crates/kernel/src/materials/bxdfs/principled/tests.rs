@@ -8,7 +8,7 @@ use crate::materials::bxdfs::lobe_tests::{
     ALPHAS, COSINES, NarrowLightPath, TestSurface, check_values, estimate_close_to_exact, spherical_direction,
 };
 use crate::materials::bxdfs::reference_tests::reference_microfacet_brdf;
-use crate::materials::lookup::WhiteLookup;
+use crate::materials::lookup::WhiteTextureLookup;
 use crate::math::DVec3;
 
 fn principled(color: Vec3, metallic: f32, alpha: f32) -> Principled {
@@ -37,7 +37,7 @@ fn leaf(color: Vec3, metallic: f32, transmission: f32, alpha: f32) -> Principled
 }
 
 fn point(principled: &Principled) -> PrincipledPoint {
-    principled.look_up_parameters(&mut WhiteLookup)
+    principled.look_up_parameters(&mut WhiteTextureLookup)
 }
 
 const RED: Vec3 = Vec3::new(0.7, 0.1, 0.05);

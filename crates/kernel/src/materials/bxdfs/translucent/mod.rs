@@ -7,7 +7,7 @@ mod bxdf;
 use std::f32::consts::FRAC_1_PI;
 
 use super::phong::{Phong, PhongBsdf};
-use crate::materials::bsdf::{BxdfMaterial, BxdfParameters};
+use crate::materials::bsdf::{BxdfParameters, SpatiallyVaryingBxdf};
 use crate::materials::lookup::ParameterLookup;
 use crate::materials::texture::ColorOrTexture;
 use crate::math::Vec3;
@@ -52,7 +52,7 @@ impl TranslucentPoint {
     }
 }
 
-impl BxdfMaterial for TranslucentPhong {
+impl SpatiallyVaryingBxdf for TranslucentPhong {
     type Point = TranslucentPoint;
 
     #[inline]

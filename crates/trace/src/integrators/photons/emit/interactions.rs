@@ -36,7 +36,7 @@ impl<'a> PathStepper<'a> for PhotonWavefront<'a> {
     fn record_surface_crossing(&mut self, _: &PathRay, _: Option<Hit>) {}
 
     #[inline(always)]
-    fn handle_walk_end(&mut self, path: &PathRay, reached: Interaction<'_, 'a>, has_passed: bool) {
+    fn handle_interaction(&mut self, path: &PathRay, reached: Interaction<'_, 'a>, has_passed: bool) {
         match reached {
             Interaction::Opaque(vertex, _, far) => {
                 let lacks_photons = self.depth == 0 && !has_passed;
