@@ -75,7 +75,7 @@ fn open_glass_warnings(loaded: &LoadedScene, open: &[OpenGlass]) -> Vec<Diagnost
     groups.iter().map(|(flaw, members)| glass_flaw_warning(loaded, *flaw, members)).collect()
 }
 
-/// Returns what keeps an open object from enclosing a volume, or `None` if glimt cannot tell how to fix it.
+/// Returns the flaw that keeps an open object from enclosing a volume, or `None` if no remedy is known.
 fn glass_flaw(loaded: &LoadedScene, open: &OpenGlass) -> Option<GlassFlaw> {
     let shape = &loaded.scene.objects[open.object as usize].shape;
     if shape.as_mesh().is_some() {

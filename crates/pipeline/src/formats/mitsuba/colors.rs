@@ -57,7 +57,19 @@ impl<'a> SceneReader<'a> {
             }
             ObjectKind::Texture => ColorSource::Texture(child.target),
             ObjectKind::Spectrum => ColorSource::Constant(self.spectrum_plugin_color(object, role)),
-            _ => {
+            ObjectKind::Scene
+            | ObjectKind::Bsdf
+            | ObjectKind::Emitter
+            | ObjectKind::Film
+            | ObjectKind::Filter
+            | ObjectKind::Integrator
+            | ObjectKind::Medium
+            | ObjectKind::Phase
+            | ObjectKind::Sampler
+            | ObjectKind::Sensor
+            | ObjectKind::Shape
+            | ObjectKind::Subsurface
+            | ObjectKind::Volume => {
                 self.error(child.span.clone(), "expected a texture", None);
                 ColorSource::Constant(DVec3::splat(0.5))
             }

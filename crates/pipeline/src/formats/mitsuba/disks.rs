@@ -13,7 +13,7 @@ use crate::math::DVec3;
 /// Sectors of a textured disk.
 const SECTORS: u32 = 512;
 
-/// A disk with Mitsuba's texture coordinates: the radius, and the angle in turns from +x.
+/// A disk with Mitsuba's texture coordinates: u is the radius, and v is the angle from +x divided by 2π.
 fn polar_disk(normal: DVec3) -> MeshData {
     let mut mesh = MeshData::from_surface([1, SECTORS], |uv| {
         let angle = TAU * uv.y;

@@ -26,7 +26,7 @@ pub(super) struct UvConvention {
     pub(super) flips_v: bool,
 }
 
-/// What the material of a part of a blend depends on within one shape.
+/// Identifies the material of a part of a blend within one shape.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) struct BlendPartKey {
     pub(super) bsdf: ObjectIndex,

@@ -6,10 +6,11 @@
 use std::path::Path;
 
 use super::graph::{ObjectIndex, ObjectKind, PluginInstance};
-use super::ply::{AttributedMesh, MeshAttribute, PlyTables};
+use super::ply::{AttributedMesh, MeshAttribute, attribute, face_attribute, triangle_mesh};
 use super::reader::SceneReader;
 use super::shapes::ShapeTarget;
 use super::textures::{MitsubaTextureUse, extension};
+use crate::assets::mesh::ply::tables::read_tables;
 use crate::formats::foreign::import::TableEntries;
 use crate::formats::foreign::meshes::MeshData;
 use crate::formats::foreign::pixels::Pixels;
@@ -116,15 +117,15 @@ impl<'a> SceneReader<'a> {
             return;
         }
         let Some(usage) = self.attribute_use(object) else { return };
-        let bytes = self.read_watched_file(path, MAX_BYTES);
-        let Some(tables) = bytes.and_then(|bytes| PlyTables::parse(&bytes)) else { return };
+        let Some(bytes) = self.read_watched_file(path, MAX_BYTES) else { return };
+        // Errors in the file are reported when it is loaded.
+        let Ok(tables) = read_tables(path, &bytes, self.token) else { return };
+        let Some(mesh) = triangle_mesh(&tables) else { return };
         let is_color = |color: &DVec3| color.min_element() >= 0.0 && color.max_element() <= 1.0;
         let colors = match usage {
-            AttributeUse::Faces if tables.mesh().is_some_and(|mesh| mesh.triangles.len() <= MAX_FACES) => {
-                Vec::new()
-            }
+            AttributeUse::Faces if mesh.triangles.len() <= MAX_FACES => Vec::new(),
             AttributeUse::Faces => return,
-            AttributeUse::VertexColors => match tables.vertex_attribute("color") {
+            AttributeUse::VertexColors => match attribute(&tables.vertices, "color") {
                 Some(color) if color.is_color && color.values.iter().all(is_color) => color.values,
                 Some(_) | None => return,
             },
@@ -139,7 +140,7 @@ impl<'a> SceneReader<'a> {
         usage: MitsubaTextureUse,
     ) -> Option<(TableEntries, String)> {
         let (name, _) = self.text(object, "name")?;
-        let attribute = self.attributes.as_ref()?.tables.face_attribute(name.strip_prefix("face_")?)?;
+        let attribute = face_attribute(&self.attributes.as_ref()?.tables, name.strip_prefix("face_")?)?;
         let is_valid = attribute.values.iter().all(|value| value.is_finite() && value.min_element() >= 0.0);
         if !is_valid
             || usage == MitsubaTextureUse::Normal
@@ -178,7 +179,7 @@ impl<'a> SceneReader<'a> {
         material: String,
         matrix: &DMat4,
     ) -> bool {
-        let Some(mut mesh) = attributes.tables.mesh() else { return false };
+        let Some(mut mesh) = triangle_mesh(&attributes.tables) else { return false };
         if self.boolean(object, "face_normals", false) {
             mesh.normals.clear();
         } else if mesh.normals.is_empty() {

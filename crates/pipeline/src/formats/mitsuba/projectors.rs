@@ -69,9 +69,9 @@ struct ProjectedImage {
     factor: DVec3,
 }
 
-/// Multiplies an image by the cube of the cosine at the corners over the cube of the cosine, so that the
-/// irradiance on a plane is that of the image. The result is at most 1 and has the peak as factor. `half` are
-/// the tangents of half the angles.
+/// Compensates for the cos³ falloff of the irradiance on a plane, so that the plane shows the image. Divides
+/// the image by cos³ relative to the corners, and scales it to a maximum of 1; the scale becomes the factor.
+/// `half` contains the tangents of half the angles of view.
 fn equalize(image: &Pixels, half: DVec2) -> ProjectedImage {
     let peak = image.values.iter().fold(Vec3::splat(1e-30), |peak, value| peak.max(*value)).as_dvec3();
     let (width, height) = (image.width.max(MIN_PIXELS), image.height.max(MIN_PIXELS));

@@ -155,7 +155,20 @@ impl<'a> SceneReader<'a> {
         let object = self.object(index);
         match object.kind {
             ObjectKind::Spectrum => Some(self.spectrum_plugin_color(object, role)),
-            _ => None,
+            ObjectKind::Scene
+            | ObjectKind::Bsdf
+            | ObjectKind::Emitter
+            | ObjectKind::Film
+            | ObjectKind::Filter
+            | ObjectKind::Integrator
+            | ObjectKind::Medium
+            | ObjectKind::Phase
+            | ObjectKind::Sampler
+            | ObjectKind::Sensor
+            | ObjectKind::Shape
+            | ObjectKind::Subsurface
+            | ObjectKind::Texture
+            | ObjectKind::Volume => None,
         }
     }
 
@@ -332,8 +345,8 @@ impl<'a> SceneReader<'a> {
         keys
     }
 
-    /// Adds a texture with these keys unless an equal one exists, and returns its name. The spans are those
-    /// of the texture and of its file name.
+    /// Adds a texture with these keys unless an equal one exists, and returns its name. The spans locate the
+    /// texture and its file name in the text.
     pub(super) fn add_texture_table(
         &mut self,
         mut keys: TableEntries,

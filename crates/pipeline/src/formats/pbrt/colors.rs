@@ -120,7 +120,15 @@ impl<'a> ColorReader<'a> {
             }
             ParameterType::Spectrum => self.spectrum_color(found, usage),
             ParameterType::Float => Ok(DVec3::splat(*found.single(found.numbers()?)?)),
-            _ => {
+            ParameterType::Integer
+            | ParameterType::Bool
+            | ParameterType::String
+            | ParameterType::Texture
+            | ParameterType::Point2
+            | ParameterType::Vector2
+            | ParameterType::Point3
+            | ParameterType::Vector3
+            | ParameterType::Normal => {
                 let error = PbrtError::new(found.span.clone(), "this parameter must be a color");
                 Err(error.with_help("its type must be rgb, spectrum, blackbody or texture"))
             }

@@ -428,7 +428,7 @@ fn interiors_of_batch<'a>(pool: &'a InteriorListPool, row: &VertexBatch) -> Opti
 
 /// Resizes a vector and sets all its elements to zero.
 fn resize_with_zeros(sums: &mut Vec<Vec3>, count: usize) {
-    // `bytemuck` compiles to `memset`, whereas `Vec::resize` alone writes one component at a time.
+    // `Vec::resize` writes one component at a time, so it is used only for new elements.
     sums.truncate(count);
     bytemuck::fill_zeroes(sums);
     sums.resize(count, Vec3::ZERO);

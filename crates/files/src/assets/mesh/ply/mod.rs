@@ -5,6 +5,7 @@ mod body;
 mod colors;
 mod faces;
 mod header;
+pub mod tables;
 pub mod write;
 
 use super::assemble::assemble_text_mesh;
