@@ -160,7 +160,7 @@ fn measure(name: &str, mesh: &TriangleMesh, embree: Option<&Embree>, options: &B
         kd_tree(mesh, &rays);
     }
     for instructions in InstructionSet::ALL {
-        if instructions.or_best_supported() != instructions
+        if instructions.or_best_if_unsupported() != instructions
             || options.instructions.is_some_and(|only| only != instructions)
         {
             continue;

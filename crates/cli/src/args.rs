@@ -50,7 +50,7 @@ pub(super) const EXIT_CODES: &str = "\
 130, 143 or 129 terminated by SIGINT, SIGTERM or SIGHUP.";
 
 /// Returns the help width in columns: `COLUMNS` if set, else the terminal's width, else 80.
-fn help_columns() -> usize {
+fn help_width() -> usize {
     let columns = std::env::var("COLUMNS").ok().and_then(|columns| columns.parse().ok());
     columns.filter(|columns| *columns > 0).unwrap_or_else(stdout_columns_or_default)
 }
@@ -72,7 +72,7 @@ const STYLES: Styles = Styles::styled()
 /// A ray tracer that lives in the terminal: edit a scene, save it, see it.
 #[derive(Clone, Debug, Parser)]
 #[command(name = "glimt", version = crate::pipeline::BUILD, after_help = AFTER_HELP, after_long_help = after_long_help(), styles = STYLES)]
-#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true, term_width = help_columns())]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true, term_width = help_width())]
 pub struct Args {
     /// A command other than rendering.
     #[command(subcommand)]

@@ -15,7 +15,7 @@ use crate::pipeline::protocol::{
 use crate::pipeline::watch::{
     ExternalChange, FileHashCache, FilePathAndContentId, Watcher, find_missing_parent_or_working_folder,
 };
-use crate::pipeline::{foreign_file_error, start};
+use crate::pipeline::{not_a_scene_file_error, start};
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::sanitize::escape_invisible_chars;
 use crate::scene::{SAME_TEXT, is_file_not_found_diagnostic, read_scene_file_text};
@@ -51,7 +51,7 @@ fn run_terminal_ui(request: RenderRequest, console: &Console) -> Result<Exit, (E
     let watcher = Watcher::start(request.poll, Arc::clone(&contents), move |change| changes.send(change))
         .map_err(no_thread)?;
     let writes = SharedWriteLog::default();
-    let listener = WorkerListener { watcher, writes: writes.clone(), ui: events.worker_sender() };
+    let listener = WorkerEventForwarder { watcher, writes: writes.clone(), ui: events.worker_sender() };
     let worker = start(request.nice, Arc::clone(&contents), move |event| listener.handle_event(event))
         .map_err(no_thread)?;
     let (remote, asked) = (worker.command_sender(), writes.clone());
@@ -160,7 +160,7 @@ fn scene_not_found_error(scene: &Path) -> Option<Diagnostic> {
         return None;
     }
     let problem =
-        foreign_file_error(scene).or_else(|| read_scene_file_text(scene).err().map(|problem| *problem));
+        not_a_scene_file_error(scene).or_else(|| read_scene_file_text(scene).err().map(|problem| *problem));
     problem.filter(is_file_not_found_diagnostic)
 }
 
@@ -305,13 +305,13 @@ impl SharedWriteLog {
 }
 
 /// Passes the worker's events to the terminal UI, the watcher and the log of written images.
-struct WorkerListener {
+struct WorkerEventForwarder {
     watcher: Watcher,
     writes: SharedWriteLog,
     ui: EventSender<Event>,
 }
 
-impl WorkerListener {
+impl WorkerEventForwarder {
     fn handle_event(&self, mut event: Event) {
         self.writes.record_event(&event);
         if matches!(event, Event::Written { .. }) {

@@ -59,7 +59,7 @@ impl NormalizedRect {
     }
 
     /// Maps a position relative to this rectangle to a position in the image.
-    pub fn to_image_position(self, position: NormalizedPosition) -> NormalizedPosition {
+    pub fn position_in_image(self, position: NormalizedPosition) -> NormalizedPosition {
         NormalizedPosition { x: self.left + position.x * self.width, y: self.top + position.y * self.height }
     }
 }
@@ -113,7 +113,7 @@ pub struct PickedInstance {
 
 /// A camera that the user moved with the keyboard.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MovedCamera {
+pub struct UserMovedCamera {
     /// The camera after the move.
     pub camera: ResolvedCamera,
     /// The scene's camera before the move.

@@ -84,7 +84,7 @@ impl<N: Hash + Eq, T> CacheOfNamedValues<N, T> {
     }
 
     /// Returns the value with this name, regardless of its key.
-    pub(super) fn get_by_name(&self, name: &N) -> Option<&Arc<T>> {
+    pub(super) fn get_even_if_stale(&self, name: &N) -> Option<&Arc<T>> {
         self.entries.get(name).map(|entry| &entry.value)
     }
 

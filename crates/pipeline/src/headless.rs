@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::protocol::{Report, Request};
 use super::render::commands::PendingCommands;
-use super::session::{RequestContext, RequestOutcome, Session};
+use super::session::{CompletedRequest, RequestContext, Session};
 use super::settings::Overrides;
 use super::sink::EventSink;
 pub use super::stages::AbortReason;
@@ -41,7 +41,7 @@ impl HeadlessSession {
         let context =
             RequestContext { request: &request, sink: &sink, token, writing: token, commands, is_postponed };
         // An in-memory image is not written, so there are no conflicts.
-        let RequestOutcome { report, warnings, conflicts: _, unchanged: _ } =
+        let CompletedRequest { report, warnings, conflicts: _, unchanged: _ } =
             self.session.run_request(&context)?;
         let state = self.session.film()?;
         let image = state.film.image(FilmQuantity::Radiance);

@@ -100,9 +100,9 @@ impl ImageDependencies<'_> {
         let meshes: Vec<Fingerprint> = scene
             .mesh_files
             .iter()
-            .map(|file| mesh_file_key(&self.describe_file_content(&file.value), file))
+            .map(|file| mesh_content_key(&self.describe_file_content(&file.value), file))
             .collect();
-        let of = keys::scene_fingerprint_context(&scene, &meshes, orbiter.as_deref());
+        let of = keys::scene_fingerprint_references(&scene, &meshes, orbiter.as_deref());
         let world = keys::world_key(&keys::surfaces_and_lights_key(&scene, &of, &[]), &eye.camera, &of);
         keys::film_sums_key(world, &self.plan.settings, self.plan.crop)
     }
@@ -130,7 +130,7 @@ impl ImageDependencies<'_> {
 }
 
 /// Returns the key for a mesh file with this content.
-fn mesh_file_key(content: &str, file: &MeshFile) -> Fingerprint {
+fn mesh_content_key(content: &str, file: &MeshFile) -> Fingerprint {
     let mut key = FingerprintHasher::new("content");
     key.add_str(content);
     if let Some(part) = file.part {

@@ -10,7 +10,7 @@ use crate::scene::fingerprint::{Fingerprint, FingerprintContext, FingerprintHash
 
 /// Returns the context for fingerprinting scene descriptions: the textures, meshes and orbiter that they
 /// refer to.
-pub(crate) fn scene_fingerprint_context<'a>(
+pub(crate) fn scene_fingerprint_references<'a>(
     scene: &'a Scene,
     meshes: &'a [Fingerprint],
     orbiter: Option<&'a str>,
@@ -20,7 +20,7 @@ pub(crate) fn scene_fingerprint_context<'a>(
 
 /// Returns the key for a mesh whose coincident emitters have been separated. `is_emissive` states whether an
 /// object's material makes the entire mesh emissive.
-pub(crate) fn mesh_with_separate_emitters_key(mesh: &Fingerprint, is_emissive: bool) -> Fingerprint {
+pub(crate) fn separated_emitters_mesh_key(mesh: &Fingerprint, is_emissive: bool) -> Fingerprint {
     FingerprintHasher::new("distinct lights").add_fingerprint(mesh).add_bool(is_emissive).finish()
 }
 
@@ -261,7 +261,7 @@ mod tests {
 
     fn keys(text: &str) -> (Fingerprint, Fingerprint, Fingerprint) {
         let scene = loaded_of(text).scene;
-        let of = scene_fingerprint_context(&scene, &[], None);
+        let of = scene_fingerprint_references(&scene, &[], None);
         (
             geometry_key(&scene, &of, DVec3::ZERO, &[], std::iter::empty()),
             lights_key(&scene, &of, DVec3::ZERO, &[], None, &[]),
@@ -298,7 +298,7 @@ mod tests {
             let scene = loaded_of(BALL).scene;
             geometry_key(
                 &scene,
-                &scene_fingerprint_context(&scene, &[], None),
+                &scene_fingerprint_references(&scene, &[], None),
                 DVec3::ZERO,
                 &[lift],
                 std::iter::empty(),
@@ -435,8 +435,7 @@ mod tests {
     #[test]
     fn trees_of_meshes_with_distinct_lights_differ() {
         let mesh = FingerprintHasher::new("mesh").finish();
-        let distinct =
-            [false, true].map(|is_emissive| Some(mesh_with_separate_emitters_key(&mesh, is_emissive)));
+        let distinct = [false, true].map(|is_emissive| Some(separated_emitters_mesh_key(&mesh, is_emissive)));
         let trees =
             [None, distinct[0], distinct[1]].map(|distinct| mesh_accel_key(&mesh, Accel::Bvh, distinct));
         assert!(trees[0] != trees[1] && trees[1] != trees[2] && trees[0] != trees[2]);
@@ -447,7 +446,7 @@ mod tests {
         let quad = "[[quad]]\ncorner = [0, 0, 0]\nu = [1, 0, 0]\nv = [0, 1, 0]\nmaterial = \"m\"\n";
         let key = |kind: &str| {
             let scene = loaded_of(&format!("{quad}[materials.m]\ntype = \"{kind}\"\n")).scene;
-            coplanar_lights_key(&scene, &scene_fingerprint_context(&scene, &[], None))
+            coplanar_lights_key(&scene, &scene_fingerprint_references(&scene, &[], None))
         };
         assert_ne!(key("phong"), key("glass"));
     }

@@ -58,8 +58,8 @@ pub use check::{
     IncrementalSceneChecker, SceneSummary, check_scene, check_scene_with_options, estimate_memory,
 };
 pub use formats::{
-    ImportError, ImportedScene, foreign_file_error, has_foreign_extension, has_importable_extension,
-    has_model_extension, import_scene,
+    ImportError, ImportedScene, has_foreign_extension, has_importable_extension, has_model_extension,
+    import_scene, not_a_scene_file_error,
 };
 pub use stages::parse::files_referenced_by_assets;
 pub use watch::content::{FileContentId, FilePathAndContentId};

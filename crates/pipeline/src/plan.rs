@@ -97,7 +97,7 @@ impl RenderPlan {
     }
 
     /// Summarizes the settings for status lines and reports.
-    pub(super) fn effective_settings(&self) -> EffectiveSettingsSummary {
+    pub(super) fn effective_settings_summary(&self) -> EffectiveSettingsSummary {
         let RenderSettings { render, dof, view, photons, layers: _ } =
             self.settings.without_ineffective_settings();
         EffectiveSettingsSummary {
@@ -170,7 +170,7 @@ pub(super) fn resolve_plan(
     };
     let plan = RenderPlan {
         path: path.to_owned(),
-        scene: scene_with_accel(scene, render.accel),
+        scene: scene_with_accel_setting(scene, render.accel),
         settings,
         crop: overrides.crop,
         shard: overrides.shard,
@@ -219,7 +219,7 @@ fn photon_settings(requested: &PhotonOptions, image: &RenderOptions) -> PhotonSe
 
 /// Returns the scene with acceleration structure `accel`. Copies the scene only if necessary, because it may
 /// be large.
-fn scene_with_accel(scene: &Arc<Scene>, accel: Accel) -> Arc<Scene> {
+fn scene_with_accel_setting(scene: &Arc<Scene>, accel: Accel) -> Arc<Scene> {
     let mut scene = Arc::clone(scene);
     if scene.render.accel != accel {
         Arc::make_mut(&mut scene).render.accel = accel;

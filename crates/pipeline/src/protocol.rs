@@ -14,8 +14,8 @@ use std::time::Instant;
 
 pub use self::stage::{Stage, StageReport, Status};
 pub use super::answers::{
-    CameraSaveResult, MovedCamera, NormalizedPosition, NormalizedRect, PickedInstance, PickedObject,
-    PickedPixel, SavedCameraEdit,
+    CameraSaveResult, NormalizedPosition, NormalizedRect, PickedInstance, PickedObject, PickedPixel,
+    SavedCameraEdit, UserMovedCamera,
 };
 pub use super::report::{
     ImageReport, LightSamplingReport, PhotonsReport, Report, SampleCounts, SampledLightSet, WorkCounters,
@@ -38,7 +38,7 @@ pub enum Command {
     /// Change the preview size and show the current image again. Rendering continues.
     Preview(Option<MaxPreviewSize>),
     /// Write this camera to the scene file. [`Event::CameraKept`] reports the result. Rendering continues.
-    KeepCamera(Box<MovedCamera>),
+    KeepCamera(Box<UserMovedCamera>),
     /// Undo this edit of the scene file unless the file has changed since then. [`Event::CameraUndone`]
     /// reports the result. Rendering continues.
     UndoCamera(SavedCameraEdit),
@@ -93,7 +93,7 @@ impl Request {
     }
 
     /// Whether the scene's own image should be written.
-    pub(super) fn writes_own_image(&self) -> bool {
+    pub(super) fn should_write_scene_image(&self) -> bool {
         self.own.is_some() || self.write != WriteRequirement::No
     }
 }
@@ -432,12 +432,12 @@ pub struct RenderProgress {
     /// Whether every pixel will have `total_samples` samples, because there is no noise target or time limit.
     pub is_total_fixed: bool,
     /// Current noise, or `None` during the first half second and the first 16 samples.
-    pub noise: Option<NoisePrediction>,
+    pub noise: Option<NoiseAndTimeToNextLevel>,
 }
 
 /// Current and predicted noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct NoisePrediction {
+pub struct NoiseAndTimeToNextLevel {
     /// Most recently measured [`Film::relative_error`](crate::film::Film::relative_error).
     pub now: f64,
     /// Seconds from the start of the render stage to the measurement.

@@ -8,8 +8,8 @@ use super::formats::has_model_extension;
 use super::inputs::ProtectedInputs;
 use super::prepare::{ReadyScene, RequestCamera};
 use super::protocol::{
-    CameraSaveResult, Event, MovedCamera, NormalizedPosition, PickedInstance, PickedObject, PickedPixel,
-    ResolvedCamera, SavedCameraEdit,
+    CameraSaveResult, Event, NormalizedPosition, PickedInstance, PickedObject, PickedPixel, ResolvedCamera,
+    SavedCameraEdit, UserMovedCamera,
 };
 use super::render::film_state::FilmState;
 use super::sink::EventSink;
@@ -30,7 +30,7 @@ use crate::world::World;
 /// A query or edit requested by the user.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum QueryOrEdit {
-    KeepCamera(Box<MovedCamera>),
+    KeepCamera(Box<UserMovedCamera>),
     UndoCamera(SavedCameraEdit),
     Pick(NormalizedPosition),
 }
@@ -120,7 +120,7 @@ impl QueryContext {
                 None => "no material in the file".to_owned(),
             },
         };
-        let instance = loaded.scene.instance_of(hit.object as usize).map(|instance| PickedInstance {
+        let instance = loaded.scene.instance_containing(hit.object as usize).map(|instance| PickedInstance {
             name: instance.name.as_deref().map(str::to_owned),
             line: loaded.line_number(&instance.span),
         });
@@ -144,7 +144,7 @@ impl QueryContext {
     /// read.
     fn save_camera(
         &self,
-        MovedCamera { camera, own }: &MovedCamera,
+        UserMovedCamera { camera, own }: &UserMovedCamera,
         inputs: &ProtectedInputs,
     ) -> Result<CameraSaveResult, String> {
         let loaded = &self.parsed.loaded;
@@ -219,8 +219,9 @@ fn replace_scene_text_if_unchanged(
     changed: &str,
     outcome: &str,
 ) -> Result<(), String> {
-    let metadata =
-        file::file_kind(path).map(|(_, metadata)| metadata).map_err(|error| describe_error(&error))?;
+    let metadata = file::file_kind_and_metadata(path)
+        .map(|(_, metadata)| metadata)
+        .map_err(|error| describe_error(&error))?;
     if let Some(why) = file::hard_linked_or_readonly_reason(&metadata) {
         return Err(format!("{} {why}: {outcome}", path.display()));
     }

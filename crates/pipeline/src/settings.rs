@@ -118,7 +118,7 @@ choice! {
 
 /// Source of a layer's values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum LayerSource {
+pub(super) enum LayerValueSource {
     /// Values recorded with the image's samples.
     Samples(SampleLayer),
     /// The variance of each pixel's luminance.
@@ -129,17 +129,17 @@ pub(super) enum LayerSource {
 
 impl OutputLayer {
     /// Returns the source of the layer's values.
-    pub(super) fn source(self) -> LayerSource {
+    pub(super) fn source(self) -> LayerValueSource {
         match self {
-            Self::Albedo => LayerSource::Samples(SampleLayer::Albedo),
-            Self::Normal => LayerSource::Samples(SampleLayer::Normal),
-            Self::Depth => LayerSource::Samples(SampleLayer::Depth),
-            Self::Variance => LayerSource::Variance,
-            Self::Samples => LayerSource::SampleCount,
-            Self::Ambient => LayerSource::Samples(SampleLayer::Ambient),
-            Self::Diffuse => LayerSource::Samples(SampleLayer::Diffuse),
-            Self::Specular => LayerSource::Samples(SampleLayer::Specular),
-            Self::Emission => LayerSource::Samples(SampleLayer::Emission),
+            Self::Albedo => LayerValueSource::Samples(SampleLayer::Albedo),
+            Self::Normal => LayerValueSource::Samples(SampleLayer::Normal),
+            Self::Depth => LayerValueSource::Samples(SampleLayer::Depth),
+            Self::Variance => LayerValueSource::Variance,
+            Self::Samples => LayerValueSource::SampleCount,
+            Self::Ambient => LayerValueSource::Samples(SampleLayer::Ambient),
+            Self::Diffuse => LayerValueSource::Samples(SampleLayer::Diffuse),
+            Self::Specular => LayerValueSource::Samples(SampleLayer::Specular),
+            Self::Emission => LayerValueSource::Samples(SampleLayer::Emission),
         }
     }
 }
@@ -147,8 +147,8 @@ impl OutputLayer {
 /// Returns the layers to record with the image's samples.
 pub(super) fn layers_to_record(layers: &[OutputLayer]) -> LayerSet {
     let recorded = |layer: &OutputLayer| match layer.source() {
-        LayerSource::Samples(layer) => Some(layer),
-        LayerSource::Variance | LayerSource::SampleCount => None,
+        LayerValueSource::Samples(layer) => Some(layer),
+        LayerValueSource::Variance | LayerValueSource::SampleCount => None,
     };
     layers.iter().filter_map(recorded).collect()
 }

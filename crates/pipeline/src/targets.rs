@@ -255,11 +255,11 @@ fn overwrites_part_or_checkpoint_error(
     }
     let head = PartFile::read_header(at).ok();
     let what = match head.as_ref().map(|head| (head.kind, head.share.index, head.share.count)) {
-        Some((part::PartOrCheckpoint::Part, index, count)) => match plan.shard {
+        Some((part::PartFileKind::Part, index, count)) => match plan.shard {
             Some((own, of)) if of != count || own == index => return None,
             Some(_) | None => format!("part {index}/{count} of a render"),
         },
-        Some((part::PartOrCheckpoint::Checkpoint, ..)) => "a checkpoint".to_owned(),
+        Some((part::PartFileKind::Checkpoint, ..)) => "a checkpoint".to_owned(),
         None => "a part or checkpoint from another version of glimt".to_owned(),
     };
     let message = format!("cannot write {}: it is {what}", target.path.display());

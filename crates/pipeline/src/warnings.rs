@@ -29,7 +29,7 @@ pub(super) fn settings_warnings(
     overrides: &Overrides,
 ) -> Vec<Diagnostic> {
     let place = |(cause, message)| warning_at_setting(cause, message, loaded, overrides);
-    find_warnings(scene, settings).into_iter().map(place).collect()
+    find_setting_warnings(scene, settings).into_iter().map(place).collect()
 }
 
 /// Creates a warning, located at the setting that caused it.
@@ -81,7 +81,7 @@ impl WarnedSetting {
     }
 }
 
-fn find_warnings(scene: &Scene, settings: &RenderSettings) -> Vec<(WarnedSetting, String)> {
+fn find_setting_warnings(scene: &Scene, settings: &RenderSettings) -> Vec<(WarnedSetting, String)> {
     let RenderSettings { render, photons, .. } = &settings.without_ineffective_settings();
     let finds_all_light = render.integrator.properties().scatters;
     let is_specular = |kind: &MaterialKind| kind.has_delta_lobe();

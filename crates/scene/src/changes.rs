@@ -38,7 +38,7 @@ fn summarize_line_changes(before: &str, after: &str) -> Option<String> {
     let lines = |count: usize| if count == 1 { "1 line".to_owned() } else { format!("{count} lines") };
     match (before, after) {
         ([], []) => None,
-        ([old], [new]) => Some(format!("line {line}: {}", describe_line_change(old, new))),
+        ([old], [new]) => Some(format!("line {line}: {}", describe_replaced_line(old, new))),
         ([], [new]) => Some(format!("line {line}: + {}", escape_and_truncate(new.trim(), MAX_LINE_CHARS))),
         ([old], []) => Some(format!("line {line}: − {}", escape_and_truncate(old.trim(), MAX_LINE_CHARS))),
         ([], new) => Some(format!("{} added at line {line}", lines(new.len()))),
@@ -49,7 +49,7 @@ fn summarize_line_changes(before: &str, after: &str) -> Option<String> {
 
 /// Describes a change to one line. Shows the key only once if the old and the new line assign to the same
 /// key.
-fn describe_line_change(old: &str, new: &str) -> String {
+fn describe_replaced_line(old: &str, new: &str) -> String {
     let parts = |line: &'_ str| {
         line.split_once('=').map(|(key, value)| (key.trim().to_owned(), value.trim().to_owned()))
     };

@@ -138,7 +138,8 @@ fn copies_are_in_file_order() {
     let instances: Vec<(Range<usize>, Option<&str>)> =
         scene.instances.iter().map(|one| (one.objects.clone(), one.name.as_deref())).collect();
     assert_eq!(instances, [(1..4, Some("left")), (5..6, None)]);
-    let of: Vec<_> = (0..7).map(|object| scene.instance_of(object).map(|one| one.objects.start)).collect();
+    let of: Vec<_> =
+        (0..7).map(|object| scene.instance_containing(object).map(|one| one.objects.start)).collect();
     assert_eq!(of, [None, Some(1), Some(1), Some(1), None, Some(5), None]);
     assert_eq!(scene.objects[2].span, scene.objects[5].span);
     let mut filter = scene.first_copy_filter();

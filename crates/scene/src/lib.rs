@@ -40,7 +40,7 @@ use diagnostic::{Diagnostic, Severity};
 pub use document::MORE_LIKE_THESE;
 pub use facing::MeshBoundingBox;
 pub use key_path::{shortened_key, split_at_unquoted_space, split_dotted_key};
-pub use other_content::{NEW_SCENE_HELP, detect_image_or_part_file, has_scene_extension};
+pub use other_content::{NEW_SCENE_HELP, detect_image_or_part_file, has_toml_extension};
 pub use read::{find_renamed_scene_by_text, lacks_camera_header, missing_file_help};
 pub use source::SceneText;
 pub use source_files::SourceFiles;
@@ -158,7 +158,7 @@ impl LoadedScene {
     /// Returns the 1-based line number in the file where `span` starts, or `None` if the file has no text for
     /// it.
     pub fn line_number(&self, span: &Range<usize>) -> Option<usize> {
-        self.source.is_span_in_text(span).then(|| self.source.line_number(span))
+        self.source.span_refers_to_text(span).then(|| self.source.line_number(span))
     }
 
     /// Returns the span of a setting's value in the file or in a `--set` argument, or `None` if neither sets

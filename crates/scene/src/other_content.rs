@@ -12,7 +12,7 @@ use crate::system::file::{self, PART_MAGIC};
 pub const NEW_SCENE_HELP: &str = "`glimt new FILE` writes a scene to start from";
 
 /// Whether a path has a scene file's extension.
-pub fn has_scene_extension(found: &Path) -> bool {
+pub fn has_toml_extension(found: &Path) -> bool {
     found.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml"))
 }
 
@@ -53,7 +53,7 @@ impl NonSceneContent {
     /// Returns the error for a file that has these contents and is therefore not a scene.
     pub(super) fn to_diagnostic(self, path: &Path) -> Box<Diagnostic> {
         // Remove the extension `.toml`.
-        let name = if has_scene_extension(path) { path.file_stem() } else { path.file_name() };
+        let name = if has_toml_extension(path) { path.file_stem() } else { path.file_name() };
         let name = name.unwrap_or(path.as_os_str()).to_string_lossy();
         let (message, help) = match self {
             Self::Model { format, ending } => (

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::diagnostic::{Diagnostic, SourceSpan};
 use super::nearest::nearest_name;
-use super::other_content::{NEW_SCENE_HELP, NonSceneContent, detect_image_or_part_file, has_scene_extension};
+use super::other_content::{NEW_SCENE_HELP, NonSceneContent, detect_image_or_part_file, has_toml_extension};
 use super::sanitize::escape_invisible_chars;
 use super::{MAX_FILE_BYTES, MAX_PARTS, SCENE_NOT_FOUND};
 use crate::system::file::{self, FileKind};
@@ -140,7 +140,7 @@ fn unreadable_refusal(path: &Path, error: &io::Error) -> RefusalMessageAndHelp {
         return (DANGLING_LINK.to_owned(), None);
     }
     if error.kind() == io::ErrorKind::NotFound {
-        let help = missing_file_help(path, has_scene_extension).unwrap_or_else(|| NEW_SCENE_HELP.to_owned());
+        let help = missing_file_help(path, has_toml_extension).unwrap_or_else(|| NEW_SCENE_HELP.to_owned());
         return (SCENE_NOT_FOUND.to_owned(), Some(help));
     }
     let help = is_too_many_open_files(error).then(|| RAISE_FILE_LIMIT.to_owned());
@@ -170,7 +170,7 @@ pub(super) fn similar_file(path: &Path, may_be_meant: impl Fn(&Path) -> bool) ->
         .take(MAX_FOLDER_FILES)
         .filter_map(|name| name.into_string().ok())
         .filter(|name| shares_stem_or_extension(Path::new(name), path) && may_be_meant(Path::new(name)))
-        .filter(|name| matches!(file::file_kind(&parent.join(name)), Ok((FileKind::Regular, _))))
+        .filter(|name| matches!(file::file_kind_and_metadata(&parent.join(name)), Ok((FileKind::Regular, _))))
         .collect();
     let near = nearest_name(path.file_name()?.to_str()?, names.iter().map(String::as_str))?;
     Some(parent.join(near))
@@ -183,7 +183,7 @@ pub fn find_renamed_scene_by_text(path: &Path, text: &str) -> Option<PathBuf> {
     let listed = if parent.as_os_str().is_empty() { Path::new(".") } else { parent };
     let length = u64::try_from(text.len()).ok()?;
     let has_text = |file: &PathBuf| {
-        matches!(file::file_kind(file), Ok((FileKind::Regular, metadata)) if metadata.len() == length)
+        matches!(file::file_kind_and_metadata(file), Ok((FileKind::Regular, metadata)) if metadata.len() == length)
             && read_bytes(file).is_ok_and(|bytes| bytes == text.as_bytes())
     };
     let names = folder::entry_names(listed).ok()?.take(MAX_FOLDER_FILES);

@@ -238,7 +238,7 @@ impl LineIndex {
     }
 
     /// The number of characters between the start of the text and a byte offset.
-    fn count_characters_before_offset(&self, source: &str, offset: usize) -> usize {
+    fn count_text_characters_before(&self, source: &str, offset: usize) -> usize {
         let step = offset / STEP;
         self.characters[step] + count_characters(&source.as_bytes()[step * STEP..offset])
     }
@@ -253,8 +253,8 @@ impl LineIndex {
         let offset = floor_char_boundary(source, offset);
         let line = self.line_number(offset);
         let start = self.starts[line - 1];
-        let before = self.count_characters_before_offset(source, offset)
-            - self.count_characters_before_offset(source, start);
+        let before = self.count_text_characters_before(source, offset)
+            - self.count_text_characters_before(source, start);
         let has_mark = source[start..offset].starts_with('\u{feff}');
         (line, before + 1 - usize::from(has_mark))
     }

@@ -94,7 +94,7 @@ impl SceneText {
 
     /// Whether a span refers to text. In a scene from a foreign file, values without a span have an empty span
     /// at the start.
-    pub(super) fn is_span_in_text(&self, span: &Range<usize>) -> bool {
+    pub(super) fn span_refers_to_text(&self, span: &Range<usize>) -> bool {
         !self.is_foreign || *span != (0..0)
     }
 
@@ -129,7 +129,7 @@ impl SceneText {
             Some(SetArg { span: own, text }) => {
                 (Path::new(SET_OPTION), text, span.start - own.start..span.end - own.start)
             }
-            None if !self.is_span_in_text(&span) => return (path.to_owned(), None),
+            None if !self.span_refers_to_text(&span) => return (path.to_owned(), None),
             None => match self.files.iter().find_map(|file| Some((file, file.local_span(&span)?))) {
                 Some((file, local)) => (file.path.as_path(), &file.text, local),
                 None => (path, &self.all, span),

@@ -77,7 +77,7 @@ impl SourceFiles {
     }
 
     /// Returns the path of the file that contains a span.
-    pub fn path_at(&self, span: &Range<usize>) -> Option<&Path> {
+    pub fn path_of_span(&self, span: &Range<usize>) -> Option<&Path> {
         self.files.iter().find(|file| file.local_span(span).is_some()).map(|file| file.path.as_path())
     }
 

@@ -45,7 +45,7 @@ pub(super) fn dollied(pose: &Pose, factor: f64, own: f64) -> Pose {
 
 /// Multiplies the field of view, or the height of an orthographic image, by `factor`, within limits. `own` is
 /// the scene's projection.
-pub(super) fn zoomed(view: Projection, own: Projection, factor: f64) -> Projection {
+pub(super) fn zoomed_projection(view: Projection, own: Projection, factor: f64) -> Projection {
     let zoomed_fov =
         |fov: f64, most: f64| round_to_step((fov * factor).clamp(MIN_FIELD.min(fov), most.max(fov)), 0.01);
     match view {
@@ -117,7 +117,7 @@ mod tests {
         let far = Pose { position: DVec3::new(0.0, 1.0, 1e6), ..POSE };
         assert_eq!(dollied(&far, 2.0, 4.0), far, "a camera that starts beyond the limit should stay there");
         let perspective = |fov| Projection::Perspective { fov };
-        let zoom = |view: Projection, factor| zoomed(view, view, factor);
+        let zoom = |view: Projection, factor| zoomed_projection(view, view, factor);
         assert_eq!(zoom(perspective(40.0), 1.1), perspective(44.0));
         assert_eq!(zoom(perspective(40.0), 100.0), perspective(160.0));
         let wide = zoom(perspective(170.0), 1.1);
@@ -126,6 +126,6 @@ mod tests {
         assert_eq!(zoom(Projection::Spherical, 2.0), Projection::Spherical);
         let [own, tall, tallest] =
             [3.0, 3.3, 3000.0].map(|view_height| Projection::Orthographic { view_height });
-        assert_eq!((zoom(own, 1.1), zoomed(tall, own, 1e9)), (tall, tallest));
+        assert_eq!((zoom(own, 1.1), zoomed_projection(tall, own, 1e9)), (tall, tallest));
     }
 }

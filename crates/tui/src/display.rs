@@ -113,7 +113,7 @@ impl Display {
         self.invalidate();
         self.window_titles[1] = TitleAndProgress::default();
         self.connection = self.link.new_flow_control(now);
-        let questions = [SYNCHRONIZED, &self.link.ask.optional_query_bytes(), ATTRIBUTES].concat();
+        let questions = [SYNCHRONIZED, &self.link.ask.requested_query_bytes(), ATTRIBUTES].concat();
         self.send(questions, Some(QueryKind::Attributes), now);
     }
 

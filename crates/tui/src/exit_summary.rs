@@ -77,7 +77,7 @@ fn describe_events_since_writing(state: &State) -> String {
     if !state.request.has_no_keyboard_overrides() {
         let is_user_written = written.iter().any(|written| written.shows.is_some());
         return match state.saving.own {
-            SceneImageProgress { .. } if state.saving.are_images_outdated() => {
+            SceneImageProgress { .. } if state.saving.are_images_older_than_scene() => {
                 messages::OLDER_THAN_EDIT.to_owned()
             }
             SceneImageProgress { .. } if is_user_written => String::new(),
@@ -141,12 +141,12 @@ pub(super) fn describe_image(report: &Report, shown: ViewMode) -> String {
     let image = &report.image;
     let time = format_seconds(report.seconds.max(image.render_seconds));
     let samples = format_sample_count_or_range(image.samples);
-    format!("{}{}×{}, {samples}, {time}", view_prefix(shown), image.width, image.height)
+    format!("{}{}×{}, {samples}, {time}", view_mode_prefix(shown), image.width, image.height)
 }
 
 /// Describes an image that was written before its render finished.
 pub(super) fn describe_unfinished_image(samples: SampleCounts, shown: ViewMode) -> String {
-    format!("{}unfinished ({})", view_prefix(shown), format_sample_count_or_range(samples))
+    format!("{}unfinished ({})", view_mode_prefix(shown), format_sample_count_or_range(samples))
 }
 
 /// Formats a sample count as in `64 samples`, or a range as in `16 to 32 samples`.
@@ -155,7 +155,7 @@ fn format_sample_count_or_range(SampleCounts { min, max, .. }: SampleCounts) -> 
     if min == max { most } else { format!("{min} to {most}") }
 }
 
-fn view_prefix(view: ViewMode) -> String {
+fn view_mode_prefix(view: ViewMode) -> String {
     let view = view_name_unless_beauty(view);
     if view.is_empty() { view } else { format!("{view}, ") }
 }

@@ -99,7 +99,7 @@ impl TestUi {
     }
 
     /// Saves a scene with this text and lets the worker load it.
-    pub(super) fn save_scene(&mut self, text: &str) {
+    pub(super) fn simulate_scene_save(&mut self, text: &str) {
         self.handle_event(Event::FileChanged(ContentChangeTime { noticed: self.now }));
         let generation = self.state.request.generation;
         self.worker_event(protocol::Event::Text { generation, text: text.into() });

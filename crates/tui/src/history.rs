@@ -53,7 +53,7 @@ impl RenderHistory {
     }
 
     /// Records that the scene has been read. New entries include the last edit.
-    pub(super) fn mark_scene_edits_read(&mut self) {
+    pub(super) fn record_scene_read(&mut self) {
         self.read_edits = self.edits;
     }
 
@@ -80,7 +80,7 @@ impl RenderHistory {
             Some(changes) if changes.is_empty() => messages::AGAIN.to_owned(),
             Some(changes) => changes.join("; "),
         };
-        past.with_stopped_prefix(words)
+        past.prefix_if_stopped(words)
     }
 
     /// Records that the camera, which has been moved with keys since request `since`, was written to the
@@ -210,7 +210,7 @@ impl RenderHistory {
     }
 
     /// Whether the newest entry belongs to this request.
-    pub(super) fn is_newest_from_request(&self, generation: u64) -> bool {
+    pub(super) fn newest_is_from_request(&self, generation: u64) -> bool {
         self.past.back().is_some_and(|newest| newest.shown.generation == generation)
     }
 
@@ -364,7 +364,7 @@ impl HistoryEntry {
     }
 
     /// Prefixes `words` with a label if the render was stopped.
-    fn with_stopped_prefix(&self, words: String) -> String {
+    fn prefix_if_stopped(&self, words: String) -> String {
         if self.origin.is_unfinished { format!("{}: {words}", messages::STOPPED) } else { words }
     }
 

@@ -121,7 +121,7 @@ pub fn cached_stage_count(stages: &str) -> String {
 }
 
 /// Time from saving the file to drawing the first changed cell.
-pub fn save_to_screen_time(time: &str) -> String {
+pub fn save_to_screen_text(time: &str) -> String {
     format!("on screen after {time}")
 }
 
@@ -212,7 +212,7 @@ pub fn photons_unsupported(other: &str) -> String {
 }
 
 /// Shown when a view is chosen.
-pub fn view_chosen(name: &str) -> String {
+pub fn view_mode_chosen(name: &str) -> String {
     format!("view {name} (preview only). w: save image · 0: reset")
 }
 

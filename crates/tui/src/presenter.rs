@@ -78,8 +78,7 @@ impl FramePresenter {
         state: &State,
         now: Instant,
     ) -> Option<Event> {
-        let is_same_request =
-            generation == self.drawn.generation && !self.newest_differs_from_drawn_preview(state);
+        let is_same_request = generation == self.drawn.generation && !self.newest_preview_kind_differs(state);
         if is_same_request && self.pacing_decision(state, now) == PacingDecision::Wait {
             self.drawn.is_old = true;
             return None;
@@ -88,7 +87,7 @@ impl FramePresenter {
     }
 
     /// Whether the newest preview differs from the drawn one in size, section or missing photons.
-    fn newest_differs_from_drawn_preview(&self, state: &State) -> bool {
+    fn newest_preview_kind_differs(&self, state: &State) -> bool {
         let latest = self.previews.lock().unwrap_or_else(PoisonError::into_inner);
         let what = |picture: &Srgb8Image| (picture.width, picture.height);
         latest.as_ref().zip(state.preview.shown.as_ref()).is_some_and(|(new, old)| {
@@ -260,7 +259,7 @@ fn mean_samples_so_far(state: &State) -> f64 {
 /// Whether the newest preview is final.
 fn is_final_preview(state: &State) -> bool {
     state.work.paused
-        || !state.work.is_request_running() && view::status_line::last_valid_scene_progress(state).is_none()
+        || !state.work.is_request_running() && view::status_line::last_valid_render_progress(state).is_none()
 }
 
 /// Time at which the state next needs a frame or a tick.

@@ -92,7 +92,7 @@ pub fn probe_terminal() -> Option<TerminalProbeResult> {
             palette: false,
             pixels: None,
         };
-        [&ask.optional_query_bytes(), SYNCHRONIZED, KITTY_QUERY].concat()
+        [&ask.requested_query_bytes(), SYNCHRONIZED, KITTY_QUERY].concat()
     };
     let is_dumb = variable("TERM").is_some_and(|term| term == "dumb");
     let answers = if is_dumb { None } else { query_in_raw_mode(&questions).ok().flatten() };

@@ -79,7 +79,7 @@ impl SignalListener {
             }
         })?;
         let handler = SignalThread { over: Arc::clone(&over), events: events.clone() };
-        spawn("terminal-watch", move || handler.watch_terminal())?;
+        spawn("terminal-watch", move || handler.watch_for_terminal_loss())?;
         Ok(Self { over })
     }
 }
@@ -221,7 +221,7 @@ impl SignalThread {
         self.deliver_signal(signal);
     }
 
-    fn watch_terminal(&self) {
+    fn watch_for_terminal_loss(&self) {
         while !self.over.load(Ordering::Acquire) {
             thread::sleep(TERMINAL_CHECK_INTERVAL);
             if !terminal::terminal_exists() {

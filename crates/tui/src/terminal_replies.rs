@@ -84,7 +84,7 @@ pub(super) struct TerminalQueries {
 
 impl TerminalQueries {
     /// The escape sequences that send the queries.
-    pub(super) fn optional_query_bytes(self) -> Vec<u8> {
+    pub(super) fn requested_query_bytes(self) -> Vec<u8> {
         let mut queries = Vec::new();
         let mut ask = |is_asked: bool, bytes: &[u8]| {
             if is_asked {
@@ -110,14 +110,14 @@ mod tests {
 
     #[test]
     fn only_useful_queries_are_sent() {
-        assert!(TerminalQueries::default().optional_query_bytes().is_empty());
+        assert!(TerminalQueries::default().requested_query_bytes().is_empty());
         for ask in [
             TerminalQueries { blocks: true, ..TerminalQueries::default() },
             TerminalQueries { name: true, blocks: true, ..TerminalQueries::default() },
         ] {
-            assert_eq!(ask.optional_query_bytes(), b"\x1b[>q");
+            assert_eq!(ask.requested_query_bytes(), b"\x1b[>q");
         }
-        let palette = TerminalQueries { palette: true, ..TerminalQueries::default() }.optional_query_bytes();
+        let palette = TerminalQueries { palette: true, ..TerminalQueries::default() }.requested_query_bytes();
         assert!(palette.ends_with(b"\x1b]4;15;?\x1b\\"));
     }
 

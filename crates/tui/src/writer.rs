@@ -51,7 +51,7 @@ impl WriteQueue {
         }
     }
 
-    fn mark_writing_ended(&self) {
+    fn mark_write_finished(&self) {
         self.lock().is_writing = false;
         self.changed.notify_all();
     }
@@ -68,7 +68,7 @@ pub(super) fn start_writer(events: &Sender<Event>) -> io::Result<()> {
         loop {
             let slice = QUEUE.wait_and_pop_slice();
             let outcome = write_all_unless_canceled(&mut out, &slice, || QUEUE.lock().is_given_up);
-            QUEUE.mark_writing_ended();
+            QUEUE.mark_write_finished();
             let event = match &outcome {
                 Ok(()) => Event::Written { bytes: slice.len() },
                 Err(error) => Event::Unwritable(error.kind()),

@@ -38,7 +38,7 @@ const SECTIONS: [CrossSection; 11] = [
 
 impl CrossSection {
     /// A vertex of the section, counted from the top toward +z.
-    fn vertex(&self, number: u32) -> Vector {
+    fn vertex_position(&self, number: u32) -> Vector {
         let (sin, cos) = sin_cos_turns(f64::from(number) / f64::from(RING));
         let lowered = match number {
             0 if self.is_cockpit => 0.3,
@@ -53,7 +53,7 @@ impl CrossSection {
 pub(crate) fn car_body() -> PolygonMesh {
     let mut surface = PolygonMesh::default();
     for section in &SECTIONS {
-        surface.positions.extend((0..RING).map(|number| section.vertex(number)));
+        surface.positions.extend((0..RING).map(|number| section.vertex_position(number)));
     }
     for first in (0..SECTIONS.len() as u32 - 1).map(|ring| ring * RING) {
         for number in 0..RING {

@@ -49,9 +49,14 @@ fn stored_photons_carry_emitted_power() {
         let (world, token) = (build.world(), CancelToken::new());
         let of_photons = PhotonSettings { count, radius: 0.1, bounces: 10_000 };
         let settings = build.photons(count.into(), 0.1).settings(3);
-        let (_, pass) =
-            PhotonPassTracer::new_with_first_pass(&world, &settings, of_photons, &ignore_progress, &token)
-                .expect("the token is not canceled");
+        let (_, pass) = PhotonPassTracer::new_and_trace_first_pass(
+            &world,
+            &settings,
+            of_photons,
+            &ignore_progress,
+            &token,
+        )
+        .expect("the token is not canceled");
         let (power, n) = (4.0 * PI, f64::from(count));
         let flux = |map: &PhotonMap| map.iter_photons().map(|photon| f64::from(photon.flux.x)).sum::<f64>();
         let error = (reflectance * (1.0 - reflectance) / n).sqrt();
@@ -72,7 +77,7 @@ fn no_photons_without_mirrors_or_glass() {
     let (world, settings, token) = (build.world(), build.settings(1), CancelToken::new());
     let of_photons = settings.photons.expect("photons are on");
     let (photons, pass) =
-        PhotonPassTracer::new_with_first_pass(&world, &settings, of_photons, &ignore_progress, &token)
+        PhotonPassTracer::new_and_trace_first_pass(&world, &settings, of_photons, &ignore_progress, &token)
             .expect("the token is not canceled");
     assert!(!photons.emits_photons());
     assert_eq!((pass.emitted, pass.stored_photon_count()), (0, 0));
@@ -289,7 +294,7 @@ fn photons_do_not_depend_on_threads_or_tiles() {
     let maps = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
         pool.install(|| {
-            let (photons, _) = PhotonPassTracer::new_with_first_pass(
+            let (photons, _) = PhotonPassTracer::new_and_trace_first_pass(
                 &world,
                 &settings,
                 of_photons,
@@ -321,7 +326,7 @@ fn photons_do_not_depend_on_threads_or_tiles() {
     for cuts in [&[0, 1, 2, 3, 4][..], &[0, 1, 4], &[0, 3, 4]] {
         for part in cuts.windows(2) {
             let samples = part[0]..part[1];
-            let (photons, _) = PhotonPassTracer::new_with_first_pass(
+            let (photons, _) = PhotonPassTracer::new_and_trace_first_pass(
                 &world,
                 &settings,
                 of_photons,
@@ -358,7 +363,7 @@ fn photons_are_aimed_at_glass_from_mesh_file() {
     let (world, settings, token) = (build.world(), build.settings(1), CancelToken::new());
     let of_photons = settings.photons.expect("photons are on");
     let (_, pass) =
-        PhotonPassTracer::new_with_first_pass(&world, &settings, of_photons, &ignore_progress, &token)
+        PhotonPassTracer::new_and_trace_first_pass(&world, &settings, of_photons, &ignore_progress, &token)
             .expect("the token is not canceled");
     assert!(pass.caustic.len() > 500, "{} of 1000", pass.caustic.len());
 }

@@ -211,7 +211,7 @@ fn mirrored_images_are_flipped_exactly() {
             let shift = DVec2::new(0.3, -0.1);
             let mut camera = camera(projection, ImageShiftAndMirror { shift, mirror });
             if let Camera::LookAt { aperture, focus, .. } = &mut camera {
-                (*aperture, *focus) = (if projection.has_lens() { 0.1 } else { 0.0 }, 3.0);
+                (*aperture, *focus) = (if projection.supports_depth_of_field() { 0.1 } else { 0.0 }, 3.0);
             }
             let build = with_camera(room(), camera, (width, height));
             build.with(|scene| (scene.render.integrator, scene.render.max_depth) = (Integrator::Path, 3))

@@ -7,7 +7,7 @@ use glimt::geometry::mesh::TriangleMesh;
 use glimt::geometry::ray::offset_origin;
 use glimt::geometry::{Ray, SurfacePoint};
 use glimt::integrators::render_tile;
-use glimt::lights::LightSceneGeometry;
+use glimt::lights::GeometryOfLight;
 use glimt::materials::fresnel::dielectric;
 use glimt::math::random::TestRandom;
 use glimt::math::transform::Transform;
@@ -277,8 +277,7 @@ fn closed_mesh_has_no_leaks() {
             let origin = (center + random.direction() * random.unit()).as_vec3();
             let ray = Ray::new(origin, (target - origin.as_dvec3()).as_vec3());
             leaks += u32::from(world.geometry.closest_hit(&ray).is_none());
-            leaks +=
-                u32::from(!world.geometry.is_occluded_except_by_light(&ray, LightSceneGeometry::Nothing));
+            leaks += u32::from(!world.geometry.is_occluded_except_by_light(&ray, GeometryOfLight::Nothing));
         }
         assert_eq!(leaks, 0, "at {center}");
     }
@@ -399,7 +398,7 @@ fn invalid_rays_hit_nothing() {
             for ray in [origin, direction] {
                 assert_eq!(world.geometry.closest_hit(&ray), None, "{ray:?}");
                 assert!(
-                    !world.geometry.is_occluded_except_by_light(&ray, LightSceneGeometry::Nothing),
+                    !world.geometry.is_occluded_except_by_light(&ray, GeometryOfLight::Nothing),
                     "{ray:?}"
                 );
             }
@@ -440,7 +439,7 @@ fn tree_finds_the_same_hit_as_brute_force() {
         found += u32::from(nearest.is_some());
         assert_eq!(world.geometry.closest_hit(&ray), nearest, "{ray:?}");
         assert_eq!(
-            world.geometry.is_occluded_except_by_light(&ray, LightSceneGeometry::Nothing),
+            world.geometry.is_occluded_except_by_light(&ray, GeometryOfLight::Nothing),
             nearest.is_some()
         );
     }

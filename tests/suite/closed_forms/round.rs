@@ -2,7 +2,7 @@
 
 use glimt::geometry::Ray;
 use glimt::geometry::ray::offset_origin;
-use glimt::lights::LightSceneGeometry;
+use glimt::lights::GeometryOfLight;
 use glimt::math::DVec3;
 use glimt::math::random::TestRandom;
 use glimt::scene::description::Shape;
@@ -138,7 +138,7 @@ fn check(shape: &Shape, geometry: &Geometry, ray: &Ray, sign: f64) -> bool {
     let length = ray.direction.as_dvec3().length();
     let (hit, line) = (geometry.closest_hit(ray), AxialLine::new(shape, ray));
     assert_eq!(
-        geometry.is_occluded_except_by_light(ray, LightSceneGeometry::Nothing),
+        geometry.is_occluded_except_by_light(ray, GeometryOfLight::Nothing),
         hit.is_some(),
         "{shape:?} {ray:?}"
     );
@@ -338,7 +338,7 @@ fn rays_pass_through_missing_caps() {
             let from = random_in(&mut random, center, 3.0).as_vec3();
             let ray = Ray::new(from, (random_in(&mut random, center, 0.7) - from.as_dvec3()).as_vec3());
             let bare = open.closest_hit(&ray).map(|hit| hit.shape);
-            assert_eq!(open.is_occluded_except_by_light(&ray, LightSceneGeometry::Nothing), bare.is_some());
+            assert_eq!(open.is_occluded_except_by_light(&ray, GeometryOfLight::Nothing), bare.is_some());
             match closed.closest_hit(&ray).map(|hit| hit.shape) {
                 Some(hit) if hit.primitive > 0 => {
                     let cap = closed.surface(&ray, &closed.closest_hit(&ray).expect("as before"));

@@ -16,11 +16,11 @@ use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::light::{Falloff, PointLight};
 use glimt::scene::description::{
     Accel, AffineMap, Camera, CoatSource, ColorSource, ConductorFresnelSource, EmissionSource, Environment,
-    ImageShiftAndMirror, ImageSource, Integrator, Light, MapOrientation, MapRows, Material, MaterialKind,
-    MeshFile, MeshReference, MicrofacetDistribution, NumberSource, Object, ObjectTransform, OpacitySource,
-    Pattern, PhongParameters, PhotonOptions, PixelFilter, Projection, ReflectingSides, RenderOptions, Scene,
-    ShadowMode, Shape, Sky, Spanned, Texture, TextureContent, TextureEncoding, TextureFilter, Tonemap, UvSet,
-    Wrap,
+    ImageShiftAndMirror, ImageSource, Integrator, Light, MapOrientation, MapRowPlacement, Material,
+    MaterialKind, MeshFile, MeshReference, MicrofacetDistribution, NumberSource, Object, ObjectTransform,
+    OpacitySource, Pattern, PhongParameters, PhotonOptions, PixelFilter, Projection, ReflectingSides,
+    RenderOptions, Scene, ShadowMode, Shape, Sky, Spanned, Texture, TextureEncoding, TextureFilter,
+    TextureSource, Tonemap, UvSet, Wrap,
 };
 use glimt::world::{
     EnvironmentSource, Geometry, MeshTree, TexelsAndMipmaps, TextureRolesNeededByRender, World, WorldInputs,
@@ -173,7 +173,7 @@ impl Build {
 
     /// Adds a pattern. Returns its index.
     pub fn pattern(&mut self, pattern: Pattern, colors: [Vec3; 2], filter: TextureFilter) -> usize {
-        let content = TextureContent::Pattern { colors, pattern };
+        let content = TextureSource::Pattern { colors, pattern };
         let name = format!("pattern {}", self.scene.textures.len());
         self.scene.textures.push(Texture { name, filter, factor: Vec3::ONE, content });
         self.scene.textures.len() - 1
@@ -252,7 +252,7 @@ impl Build {
             encoding: TextureEncoding::Linear,
             image: None,
         };
-        let (name, content) = (format!("{number}"), TextureContent::Image(image));
+        let (name, content) = (format!("{number}"), TextureSource::Image(image));
         self.scene.textures.push(Texture { name, filter, factor: Vec3::ONE, content });
         number
     }
@@ -261,7 +261,7 @@ impl Build {
     pub fn environment(self, radiance: f32) -> Self {
         let color = Vec3::splat(radiance);
         self.with(|scene| {
-            let (orientation, rows) = (MapOrientation::Turn(0.0), MapRows::Centers);
+            let (orientation, rows) = (MapOrientation::Turn(0.0), MapRowPlacement::Centers);
             scene.environment = Some(Environment { color, file: None, sky: None, orientation, rows });
         })
     }
@@ -277,7 +277,7 @@ impl Build {
         self.sky = Some(Arc::new(Texels { width, height, data: TexelData::Float(texels), unusable: 0 }));
         let file = Some(Spanned { value: PathBuf::from("sky.exr"), span: 0..0 });
         self.with(|scene| {
-            let rows = MapRows::Centers;
+            let rows = MapRowPlacement::Centers;
             scene.environment = Some(Environment { color: Vec3::ONE, file, sky: None, orientation, rows });
         })
     }
@@ -289,7 +289,7 @@ impl Build {
             file: None,
             sky: Some(sky),
             orientation: MapOrientation::Turn(rotate),
-            rows: MapRows::Centers,
+            rows: MapRowPlacement::Centers,
         };
         self.with(|scene| scene.environment = Some(environment))
     }
@@ -310,7 +310,8 @@ impl Build {
         let geometry = Geometry::from_scene(&self.scene, &parts.meshes, origin, &CancelToken::new());
         let geometry = Arc::new(geometry.expect("not canceled"));
         let sky = self.scene.environment.as_ref().and_then(|environment| environment.sky.as_ref());
-        let map = || self.sky.as_ref().and_then(|texels| build_environment_map(texels, MapRows::Centers));
+        let map =
+            || self.sky.as_ref().and_then(|texels| build_environment_map(texels, MapRowPlacement::Centers));
         let map = || map().map(EnvironmentSource::Map);
         let sky = sky.map(|sky| EnvironmentSource::Sky(build_sky(sky))).or_else(map);
         let lights = build_lights(&self.scene, &geometry, &parts.images, sky, &CancelToken::new())
@@ -392,7 +393,7 @@ pub fn tile(world: &World, settings: &RenderSettings, rect: Rect, samples: u32) 
 pub fn maps(world: &World, settings: &RenderSettings, samples: u32) -> Option<PhotonPassesBySample> {
     let token = CancelToken::new();
     settings.without_ineffective_settings().photons.filter(|_| settings.gathers_photons()).map(|of_photons| {
-        let photons = integrators::PhotonPassTracer::new_with_first_pass(
+        let photons = integrators::PhotonPassTracer::new_and_trace_first_pass(
             world,
             settings,
             of_photons,

@@ -120,7 +120,7 @@ fn reset_undoes_every_key() {
         ("]", messages::exposure_changed("+0.25")),
         ("l", messages::CAMERA_MOVED.to_owned()),
         ("<", messages::CAMERA_MOVED.to_owned()),
-        ("v", messages::view_chosen("normal")),
+        ("v", messages::view_mode_chosen("normal")),
     ] {
         terminal.press(key);
         terminal.wait_for_message(&message);

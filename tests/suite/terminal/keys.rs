@@ -64,7 +64,7 @@ fn views_are_shown_and_saved_on_request() {
     let beauty = folder.bytes("scene.png");
 
     terminal.press("v");
-    terminal.wait_for_message(&messages::view_chosen("normal"));
+    terminal.wait_for_message(&messages::view_mode_chosen("normal"));
     terminal.wait_for_render(2);
     // The board faces the camera, so its normal (0, 0, 1) is shown as (n + 1)/2, without tone mapping.
     let board = vt100::Color::Rgb(128, 128, 255);

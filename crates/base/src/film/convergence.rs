@@ -306,11 +306,7 @@ impl ConvergenceModel {
 
     /// Factor by which doubling the samples to 2^`level` reduced the variance in the specified halves of a
     /// tile.
-    fn clamped_doubling_variance_reduction(
-        steps: &SquaredMeanChanges,
-        level: usize,
-        halves: &[usize],
-    ) -> f64 {
+    fn clamped_measured_reduction(steps: &SquaredMeanChanges, level: usize, halves: &[usize]) -> f64 {
         steps
             .measured_variance_reduction(level, halves)
             .map_or(INDEPENDENT_REDUCTION, |fall| fall.clamp(INDEPENDENT_REDUCTION, MAX_REDUCTION))
@@ -324,7 +320,7 @@ impl ConvergenceModel {
         halves: &[usize],
     ) -> f64 {
         predict_doubling_variance_reduction(
-            Self::clamped_doubling_variance_reduction(steps, level, halves),
+            Self::clamped_measured_reduction(steps, level, halves),
             steps.reduction_confidence(level, halves),
         )
     }
@@ -345,7 +341,7 @@ impl ConvergenceModel {
         let level = count.checked_ilog2()? as usize;
         let SquaredStepPair { last, before } =
             steps.squared_step_pair_at_level(level, (cell, half), is_relative)?;
-        let fall = Self::clamped_doubling_variance_reduction(steps, level, &[half]);
+        let fall = Self::clamped_measured_reduction(steps, level, &[half]);
         let step = before.map_or(last, |before| (last + 2.0 * before / fall) / 3.0);
         let rate = predict_doubling_variance_reduction(fall, steps.reduction_confidence(level, &[half]));
         let by_two = variance_from_squared_step(step, count, rate);

@@ -50,7 +50,7 @@ impl LayerSums {
 
     /// Replaces the sums of all pixels and returns the previous sums. If the sizes differ, does nothing and
     /// returns `other`.
-    pub(super) fn swap_if_same_size(&mut self, mut other: Self) -> Self {
+    pub(super) fn replace_if_same_size(&mut self, mut other: Self) -> Self {
         if self.sums.len() == other.sums.len() {
             std::mem::swap(self, &mut other);
         }

@@ -13,7 +13,7 @@ pub fn total_samples_to_reduce_error(power: f64, part: f64, count: u32) -> u32 {
 
 /// Noise in one half of a cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CellHalfNoise {
+pub struct HalfCellNoise {
     /// Mean variance of the pixels' luminance.
     pub variance: f64,
     /// Mean luminance.
@@ -26,7 +26,7 @@ pub struct CellHalfNoise {
 
 /// An image's noise level and convergence rate.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ImageNoiseAndConvergence {
+pub struct NoiseAndConvergenceRate {
     /// Relative standard error: [`Film::relative_error`].
     pub relative_error: f64,
     /// Expected exponent: the squared error falls with this power of the sample count.
@@ -48,7 +48,7 @@ impl NoiseSums {
         if self.left > 0.0 { libm::log2(self.variance / self.left) } else { 1.0 }
     }
 
-    fn add_cell_half(&mut self, noise: &CellHalfNoise, pixels: f64) {
+    fn add_cell_half(&mut self, noise: &HalfCellNoise, pixels: f64) {
         self.variance += pixels * noise.variance;
         self.left += pixels * noise.variance * libm::exp2(-noise.power);
         self.mean += pixels * noise.mean;
@@ -67,20 +67,20 @@ impl Film {
     }
 
     /// Returns [`Film::relative_error`] and its convergence exponent.
-    pub fn noise_and_convergence(&self) -> Option<ImageNoiseAndConvergence> {
+    pub fn noise_and_convergence(&self) -> Option<NoiseAndConvergenceRate> {
         let sums @ NoiseSums { variance, mean, .. } = self.noise_sums()?;
         let pixels = self.crop_rect().area() as f64;
         let error = (variance / pixels).sqrt();
         // A black image without error has a relative error of 0.
         let relative_error = if error == 0.0 { 0.0 } else { error / (mean / pixels) };
-        Some(ImageNoiseAndConvergence { relative_error, power: sums.squared_error_decay_exponent() })
+        Some(NoiseAndConvergenceRate { relative_error, power: sums.squared_error_decay_exponent() })
             .filter(|noise| noise.relative_error.is_finite())
     }
 
     /// Standard error of a complete image's mean luminance, assuming independent pixel errors.
     /// Returns `None` for crops, for photons (because they correlate the pixels' errors), and if a pixel has
     /// fewer than two samples.
-    pub fn mean_luminance_error(&self) -> Option<f64> {
+    pub fn mean_luminance_standard_error(&self) -> Option<f64> {
         let is_whole = (self.crop_rect().width, self.crop_rect().height) == (self.width(), self.height());
         let is_apart = self.convergence == ConvergenceModel::Stratified;
         let sums = if is_whole && is_apart { self.noise_sums()? } else { return None };
@@ -98,7 +98,7 @@ impl Film {
             for (cell, half) in halves {
                 let pixels = self.cell_half_pixel_count(cell, half) as f64;
                 if pixels > 0.0 {
-                    sums.add_cell_half(&self.half_cell_noise(cell, half)?, pixels);
+                    sums.add_cell_half(&self.noise_in_cell_half(cell, half)?, pixels);
                 }
             }
             Some(sums)
@@ -121,7 +121,7 @@ impl Film {
 
     /// Noise in one half of a cell, or `None` if the half has no pixels or if a pixel has fewer than two
     /// samples.
-    pub fn half_cell_noise(&self, number: usize, half: usize) -> Option<CellHalfNoise> {
+    pub fn noise_in_cell_half(&self, number: usize, half: usize) -> Option<HalfCellNoise> {
         let tile = self.lock_tile(number / CELLS);
         let (mut pixels, mut samples, mut sum) = (0_u32, u32::MAX, 0.0);
         for pixel in self.pixel_indices_in_noise_cell_half(number, half) {
@@ -136,7 +136,7 @@ impl Film {
             samples,
             false,
         )?;
-        Some(CellHalfNoise {
+        Some(HalfCellNoise {
             variance: variance / pixels,
             mean: sum / pixels,
             samples,
@@ -160,13 +160,13 @@ impl Film {
     }
 
     /// Combined noise in one half of every cell in a tile. Returns `None` under the same conditions as
-    /// [`Film::half_cell_noise`].
-    pub fn noise_in_tile_half(&self, tile: usize, half: usize) -> Option<CellHalfNoise> {
+    /// [`Film::noise_in_cell_half`].
+    pub fn noise_in_tile_half(&self, tile: usize, half: usize) -> Option<HalfCellNoise> {
         let (mut pixels, mut samples, mut sums) = (0.0, u32::MAX, NoiseSums::default());
         for cell in CELLS * tile..CELLS * (tile + 1) {
             let count = self.cell_half_pixel_count(cell, half) as f64;
             if count > 0.0 {
-                let noise = self.half_cell_noise(cell, half)?;
+                let noise = self.noise_in_cell_half(cell, half)?;
                 sums.add_cell_half(&noise, count);
                 samples = samples.min(noise.samples);
                 pixels += count;
@@ -174,7 +174,7 @@ impl Film {
         }
         let (variance, mean, power) =
             (sums.variance / pixels, sums.mean / pixels, sums.squared_error_decay_exponent());
-        (pixels > 0.0).then_some(CellHalfNoise { variance, mean, samples, power })
+        (pixels > 0.0).then_some(HalfCellNoise { variance, mean, samples, power })
     }
 
     /// Relative mean squared error of a half-cell after the first `count` samples per pixel, and its
@@ -296,16 +296,16 @@ mod tests {
     fn image_mean_has_a_smaller_error_than_pixels() {
         // Two pixels with variances 1 and 0.25.
         let film = film(&[&[4.0, 6.0], &[0.5, 1.5]]);
-        let error = film.mean_luminance_error().expect("an estimate");
+        let error = film.mean_luminance_standard_error().expect("an estimate");
         assert!((error - 1.25_f64.sqrt() / 2.0).abs() < 1e-6, "{error}");
         assert_eq!(
-            film.with_convergence_model(ConvergenceModel::Photons).mean_luminance_error(),
+            film.with_convergence_model(ConvergenceModel::Photons).mean_luminance_standard_error(),
             None,
             "photons correlate pixel errors"
         );
-        assert_eq!(self::film(&[&[4.0, 6.0], &[0.5]]).mean_luminance_error(), None);
+        assert_eq!(self::film(&[&[4.0, 6.0], &[0.5]]).mean_luminance_standard_error(), None);
         let part = Film::new(4, 1, Some(Rect { x: 0, y: 0, width: 2, height: 1 })).expect("a film");
-        assert_eq!(part.mean_luminance_error(), None);
+        assert_eq!(part.mean_luminance_standard_error(), None);
     }
 
     #[test]

@@ -27,7 +27,7 @@ impl SelectedPixels {
     /// Image column and row of the selected pixel `number`.
     #[inline]
     pub fn image_position(&self, number: u32) -> (u32, u32) {
-        let index = self.part.index_in_rect(number, self.rect);
+        let index = self.part.nth_pixel_index_in_rect(number, self.rect);
         (self.rect.x + index % self.rect.width, self.rect.y + index / self.rect.width)
     }
 }
@@ -53,7 +53,7 @@ impl PixelSubset {
 
     /// Row-major index, within the rectangle, of the selected pixel `number`.
     #[inline(always)]
-    pub fn index_in_rect(self, number: u32, rect: Rect) -> u32 {
+    pub fn nth_pixel_index_in_rect(self, number: u32, rect: Rect) -> u32 {
         match self {
             Self::All => number,
             // If the area is odd, the last pixel belongs to the first half.

@@ -80,7 +80,7 @@ impl Previewer {
     }
 
     /// Whether every tile of the film has been processed at least once. If so, the result of
-    /// [`Previewer::build_image`] has no gaps but may be slightly outdated.
+    /// [`Previewer::build_radiance_image`] has no gaps but may be slightly outdated.
     pub fn has_processed_all_tiles(&self) -> bool {
         self.is_whole
     }
@@ -119,7 +119,7 @@ impl Previewer {
 
     /// Builds the preview from the processed tiles. Pixels without samples show `base` (a coarse image of any
     /// size), or black if there is no base.
-    pub fn build_image(&self, base: Option<&RadianceImage>) -> RadianceImage {
+    pub fn build_radiance_image(&self, base: Option<&RadianceImage>) -> RadianceImage {
         let width = self.width as usize;
         let mut pixels = Vec::with_capacity(width * self.height as usize);
         let mut base = base.map(Cow::Borrowed);
@@ -256,7 +256,7 @@ mod tests {
     fn preview(film: &Film, width: u32, height: u32, base: Option<&RadianceImage>) -> RadianceImage {
         let mut previewer = Previewer::new(width, height);
         assert!(previewer.refresh_changed_tiles(film, None));
-        previewer.build_image(base)
+        previewer.build_radiance_image(base)
     }
 
     fn pattern(x: u32, y: u32) -> f32 {
@@ -308,7 +308,7 @@ mod tests {
         let first = film(70, 40, None, |x, _| (x < 20).then_some(1.0));
         let mut picture = |film: &Film| {
             previewer.refresh_changed_tiles(film, None);
-            previewer.build_image(None)
+            previewer.build_radiance_image(None)
         };
         assert_eq!(picture(&first), preview(&first, 9, 5, None));
         let rect = first.tile_rect(1).expect("a tile");
@@ -372,7 +372,7 @@ mod tests {
             assert!(!previewer.refresh_changed_tiles(&film, Some(past)), "slice {slice}");
         }
         assert!(previewer.has_processed_all_tiles());
-        assert_eq!(previewer.build_image(None), preview(&film, 23, 23, None));
+        assert_eq!(previewer.build_radiance_image(None), preview(&film, 23, 23, None));
         // Changes to tiles before the current position are processed in the next pass.
         previewer.refresh_changed_tiles(&film, Some(past));
         let rect = film.tile_rect(0).expect("a tile");
@@ -390,7 +390,7 @@ mod tests {
             previewer.refresh_changed_tiles(&film, Some(past));
         }
         assert!(previewer.has_processed_all_tiles());
-        assert_eq!(previewer.build_image(None), preview(&film, 23, 23, None));
+        assert_eq!(previewer.build_radiance_image(None), preview(&film, 23, 23, None));
         assert!(previewer.refresh_changed_tiles(&film, None));
     }
 }

@@ -51,7 +51,7 @@ impl StoredTile {
     }
 
     /// Number of block sums, including the sum in progress, which may be empty.
-    pub fn block_count(&self) -> usize {
+    pub fn sample_block_count(&self) -> usize {
         self.tile.earlier.len() + 1
     }
 
@@ -158,7 +158,7 @@ impl Film {
         if PixelSubset::Half(half).count(rect.area()) == 0 {
             return 0;
         }
-        let index = PixelSubset::Half(half).index_in_rect(0, rect);
+        let index = PixelSubset::Half(half).nth_pixel_index_in_rect(0, rect);
         let (x, y) = (rect.x + index % rect.width - tile.x, rect.y + index / rect.width - tile.y);
         self.lock_tile(cell / CELLS).sample_count((y * tile.width + x) as usize)
     }

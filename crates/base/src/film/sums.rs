@@ -18,7 +18,7 @@ pub enum FilmCreationError {
     #[error(
         "a {width}×{height} image needs {} of memory, more than is available; make it smaller{}",
         describe_byte_size(*.bytes),
-        remedy(*.crop_helps)
+        crop_advice(*.crop_helps)
     )]
     Memory {
         /// Image width in pixels.
@@ -48,7 +48,7 @@ fn describe_byte_size(bytes: u64) -> String {
     }
 }
 
-fn remedy(crop_helps: bool) -> &'static str {
+fn crop_advice(crop_helps: bool) -> &'static str {
     if crop_helps {
         ", or render only part of it with a crop"
     } else {
@@ -127,7 +127,7 @@ impl Tile {
     pub(super) fn mean(&self, index: usize) -> Option<DVec3> {
         self.mean_from_filter_lobe_sums(
             index,
-            || self.positive_filter_lobe_sum(index),
+            || self.positive_lobe_sample_sum(index),
             |negative| pixel_sum_over_sample_blocks(&negative.earlier, &negative.sums, index),
         )
     }
@@ -162,7 +162,7 @@ impl Tile {
 
     /// Sum of a pixel's samples outside negative lobes.
     #[inline(always)]
-    fn positive_filter_lobe_sum(&self, index: usize) -> DVec3 {
+    fn positive_lobe_sample_sum(&self, index: usize) -> DVec3 {
         if self.earlier.is_empty() {
             self.sums[index]
         } else {
@@ -370,7 +370,7 @@ impl Film {
                 tile.layers.replace_pixel(index, &samples.layers, i);
             }
         }
-        let replaced = is_whole.then(|| tile.layers.swap_if_same_size(samples.layers));
+        let replaced = is_whole.then(|| tile.layers.replace_if_same_size(samples.layers));
         tile.revision += 1;
         drop(guard);
         if let Some(replaced) = replaced.filter(|_| self.layers > 0) {

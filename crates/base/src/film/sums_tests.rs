@@ -248,7 +248,7 @@ fn snapshots_are_consistent_during_rendering() {
                 let whole = film.radiance_image();
                 assert!(whole.pixels.iter().all(|p| *p == Vec3::ZERO || *p == Vec3::splat(2.0)));
                 previewer.refresh_changed_tiles(&film, None);
-                let small = previewer.build_image(None);
+                let small = previewer.build_radiance_image(None);
                 assert!(small.pixels.iter().all(|p| *p == Vec3::ZERO || (p.x - 2.0).abs() < 1e-5));
             }
         });

@@ -48,7 +48,7 @@ pub fn erf_and_gaussian(x: f32) -> (f32, f32) {
 /// Returns the x at which (1 + erf(x))/2 equals `p`, which is in (0, 1), with a relative error of 1e-6
 /// (Giles, *Approximating the erfinv Function*, GPU Computing Gems Jade Edition, 2011).
 #[inline(always)]
-pub fn gaussian_quantile(p: f32) -> f32 {
+pub fn half_variance_normal_quantile(p: f32) -> f32 {
     let w = -LN_2 as f32 * log2(4.0 * p * (1.0 - p));
     let (near, far) = (w - 2.5, w.max(0.0).sqrt() - 3.0);
     let center = 2.185_808_7e-4
@@ -265,7 +265,7 @@ mod tests {
         assert_eq!([f32::INFINITY, f32::NEG_INFINITY].map(erf_and_gaussian), [(1.0, 0.0), (-1.0, 0.0)]);
         for i in 1..200_000 {
             let p = (i as f32 / 200_000.0).powi(2);
-            let x = f64::from(gaussian_quantile(p));
+            let x = f64::from(half_variance_normal_quantile(p));
             let found = 0.5 * libm::erfc(-x);
             // Above ½, 1 − p is rounded.
             let error = 4e-6 * f64::from(p.min(1.0 - p)) + 1.2e-7;

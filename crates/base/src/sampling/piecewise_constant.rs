@@ -52,7 +52,7 @@ impl PiecewiseConstant2D {
     pub fn sample(&self, u: [f32; 2]) -> GridSample {
         let (row, across) = find_interval_and_position(&self.rows, &self.row_guide, u[1]);
         let guide = &self.column_guide[row * self.columns..(row + 1) * self.columns];
-        let (column, along) = find_interval_and_position(self.row_cumulative_sums(row), guide, u[0]);
+        let (column, along) = find_interval_and_position(self.cumulative_sums_of_row(row), guide, u[0]);
         GridSample { column, row, rest: [along, across] }
     }
 
@@ -65,12 +65,12 @@ impl PiecewiseConstant2D {
     /// Probability of sampling `column` within its row.
     #[inline(always)]
     pub fn column_probability_in_row(&self, row: usize, column: usize) -> f32 {
-        let sums = self.row_cumulative_sums(row);
+        let sums = self.cumulative_sums_of_row(row);
         sums[column + 1] - sums[column]
     }
 
     #[inline(always)]
-    fn row_cumulative_sums(&self, row: usize) -> &[f32] {
+    fn cumulative_sums_of_row(&self, row: usize) -> &[f32] {
         let start = row * (self.columns + 1);
         &self.in_row[start..=start + self.columns]
     }

@@ -148,14 +148,15 @@ fn owen_scrambled_points<const N: usize>(indices: [u32; N], seeds: [u32; N]) -> 
     // Run each step over all lanes before the next step so that compilers vectorize it.
     let mut places = indices;
     for (place, &seed) in places.iter_mut().zip(&seeds) {
-        *place = owen_scramble(place.reverse_bits(), seed).reverse_bits();
+        *place = owen_scramble_reversed(place.reverse_bits(), seed).reverse_bits();
     }
     let mut points = [[0.0; N]; 2];
     for i in 0..N {
-        points[0][i] = reversed_bits_to_unit(owen_scramble(places[i], mix_bits(seeds[i] ^ 0x68bc_21eb)));
+        points[0][i] =
+            reversed_bits_to_unit(owen_scramble_reversed(places[i], mix_bits(seeds[i] ^ 0x68bc_21eb)));
     }
     for i in 0..N {
-        points[1][i] = reversed_bits_to_unit(owen_scramble(
+        points[1][i] = reversed_bits_to_unit(owen_scramble_reversed(
             reversed_second_sobol(places[i]),
             mix_bits(seeds[i] ^ 0x02e5_be93),
         ));
@@ -186,7 +187,7 @@ fn reversed_second_sobol(mut bits: u32) -> u32 {
 /// Karras, *Stratified Sampling for Stochastic Transparency*, 2011, with the constants from Vegdahl,
 /// *Building a Better LK Hash*, 2021).
 #[inline(always)]
-fn owen_scramble(mut bits: u32, seed: u32) -> u32 {
+fn owen_scramble_reversed(mut bits: u32, seed: u32) -> u32 {
     bits ^= bits.wrapping_mul(0x3d20_adea);
     bits = bits.wrapping_add(seed);
     bits = bits.wrapping_mul((seed >> 16) | 1);

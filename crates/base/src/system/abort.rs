@@ -16,7 +16,7 @@ use nix::unistd::{pause, write};
 use signal_hook::consts::SIGABRT;
 use signal_hook::low_level;
 
-use super::memory::is_allocation_failure_handled;
+use super::memory::caller_handles_alloc_failure;
 
 /// Function that restores the terminal and makes only async-signal-safe calls.
 static RESTORE_TERMINAL: OnceLock<fn()> = OnceLock::new();
@@ -31,8 +31,8 @@ pub struct AbortingAllocator;
 
 /// Ends the process if the allocation failed and its caller does not handle the failure.
 #[inline(always)]
-fn check_allocation(memory: *mut u8, bytes: usize) -> *mut u8 {
-    if memory.is_null() && !is_allocation_failure_handled() {
+fn abort_if_allocation_failed(memory: *mut u8, bytes: usize) -> *mut u8 {
+    if memory.is_null() && !caller_handles_alloc_failure() {
         abort_out_of_memory(bytes);
     }
     memory
@@ -59,19 +59,19 @@ unsafe impl GlobalAlloc for AbortingAllocator {
     #[inline]
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         // SAFETY: the caller upholds the contract of `GlobalAlloc`.
-        check_allocation(unsafe { System.alloc(layout) }, layout.size())
+        abort_if_allocation_failed(unsafe { System.alloc(layout) }, layout.size())
     }
 
     #[inline]
     unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
         // SAFETY: as above.
-        check_allocation(unsafe { System.alloc_zeroed(layout) }, layout.size())
+        abort_if_allocation_failed(unsafe { System.alloc_zeroed(layout) }, layout.size())
     }
 
     #[inline]
     unsafe fn realloc(&self, memory: *mut u8, layout: Layout, new_bytes: usize) -> *mut u8 {
         // SAFETY: as above.
-        check_allocation(unsafe { System.realloc(memory, layout, new_bytes) }, new_bytes)
+        abort_if_allocation_failed(unsafe { System.realloc(memory, layout, new_bytes) }, new_bytes)
     }
 
     #[inline]

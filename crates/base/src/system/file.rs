@@ -48,7 +48,7 @@ impl FileKind {
 ///
 /// # Errors
 /// Returns an error if the file does not exist or its metadata cannot be read.
-pub fn file_kind(path: &Path) -> io::Result<(FileKind, Metadata)> {
+pub fn file_kind_and_metadata(path: &Path) -> io::Result<(FileKind, Metadata)> {
     let metadata = fs::metadata(path)?;
     Ok((FileKind::from_metadata(path, &metadata), metadata))
 }
@@ -119,7 +119,7 @@ pub fn hard_linked_or_readonly_reason(metadata: &Metadata) -> Option<&'static st
 /// # Errors
 /// Returns an error if the file does not exist or cannot be read.
 pub fn open_regular_file(path: &Path) -> io::Result<Result<(File, Metadata), FileKind>> {
-    let (kind, _) = file_kind(path)?;
+    let (kind, _) = file_kind_and_metadata(path)?;
     if kind != FileKind::Regular {
         return Ok(Err(kind));
     }

@@ -13,7 +13,7 @@ thread_local! {
 }
 
 /// Whether the caller of the current allocation handles its failure.
-pub(super) fn is_allocation_failure_handled() -> bool {
+pub(super) fn caller_handles_alloc_failure() -> bool {
     MAY_FAIL.get()
 }
 
@@ -146,7 +146,7 @@ mod tests {
     fn only_fallible_reservations_may_fail() {
         let mut bytes = Vec::<u8>::new();
         assert!(try_reserve_exact(&mut bytes, isize::MAX as usize).is_err());
-        assert!(!is_allocation_failure_handled());
+        assert!(!caller_handles_alloc_failure());
         assert!(try_reserve_exact(&mut bytes, 100).is_ok() && bytes.capacity() >= 100);
     }
 

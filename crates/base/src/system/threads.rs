@@ -50,14 +50,14 @@ pub fn logical_cpu_pool() -> std::result::Result<ThreadPool, String> {
 /// # Errors
 /// Returns the system's out-of-memory error if the stacks do not fit.
 pub fn check_thread_stack_memory(threads: usize) -> Result<()> {
-    match limit_exhausted_by_thread_stacks(threads) {
+    match name_of_exceeded_stack_limit(threads) {
         Some(_) => Err(Error::from_raw_os_error(nix::libc::ENOMEM)),
         None => Ok(()),
     }
 }
 
 /// Setting whose limit leaves no room for the stacks of `threads` more threads, or `None` if they fit.
-fn limit_exhausted_by_thread_stacks(threads: usize) -> Option<&'static str> {
+fn name_of_exceeded_stack_limit(threads: usize) -> Option<&'static str> {
     memory::limit_preventing_mapping((threads as u64).saturating_mul(STACK_BYTES).saturating_add(SPARE_BYTES))
 }
 
@@ -70,7 +70,7 @@ pub fn describe_thread_start_failure(
 ) -> String {
     let what = if threads == 1 { "a thread".to_owned() } else { format!("{threads} threads") };
     let fewer = if has_threads_option && threads > 1 { "use fewer (--threads 1), or " } else { "" };
-    match limit_exhausted_by_thread_stacks(threads) {
+    match name_of_exceeded_stack_limit(threads) {
         Some(setting) => {
             format!("out of memory: cannot start {what}; {fewer}raise the memory limit ({setting})")
         }

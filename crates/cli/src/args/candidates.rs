@@ -10,7 +10,7 @@ use crate::pipeline::{has_foreign_extension, has_importable_extension, has_model
 use crate::scene::keys::key::{KeyInfo, TableSyntax, ValueKind};
 use crate::scene::keys::{all_paths_with_descriptions, all_tables, color_names};
 use crate::scene::outline::{OutlineTable, document_outline};
-use crate::scene::{has_scene_extension, read_scene_file_text};
+use crate::scene::{has_toml_extension, read_scene_file_text};
 
 /// The command line being completed, split into words, if the shell script does not pass it as arguments.
 static WORDS: OnceLock<Vec<OsString>> = OnceLock::new();
@@ -27,13 +27,13 @@ fn command_line_words() -> Vec<OsString> {
 
 /// Completes scenes.
 pub(crate) fn scene_completer() -> ArgValueCompleter {
-    ArgValueCompleter::new(PathCompleter::file().filter(has_scene_extension))
+    ArgValueCompleter::new(PathCompleter::file().filter(has_toml_extension))
 }
 
 /// Completes glimt scenes and scenes from other renderers.
 pub(crate) fn any_scene_completer() -> ArgValueCompleter {
     let is_scene = |path: &std::path::Path| {
-        has_scene_extension(path) || has_foreign_extension(path) && !has_model_extension(path)
+        has_toml_extension(path) || has_foreign_extension(path) && !has_model_extension(path)
     };
     ArgValueCompleter::new(PathCompleter::file().filter(is_scene))
 }
@@ -41,7 +41,7 @@ pub(crate) fn any_scene_completer() -> ArgValueCompleter {
 /// Completes scenes and foreign files.
 pub(crate) fn scene_or_foreign_completer() -> ArgValueCompleter {
     ArgValueCompleter::new(
-        PathCompleter::file().filter(|path| has_scene_extension(path) || has_foreign_extension(path)),
+        PathCompleter::file().filter(|path| has_toml_extension(path) || has_foreign_extension(path)),
     )
 }
 
@@ -55,8 +55,7 @@ pub(crate) fn import_completer() -> ArgValueCompleter {
 pub(crate) fn key_assignment_completer() -> ArgValueCompleter {
     ArgValueCompleter::new(|current: &OsStr| {
         let Some(current) = current.to_str() else { return Vec::new() };
-        let scene =
-            command_line_words().into_iter().map(PathBuf::from).find(|word| has_scene_extension(word));
+        let scene = command_line_words().into_iter().map(PathBuf::from).find(|word| has_toml_extension(word));
         let text = scene.and_then(|scene| read_scene_file_text(&scene).ok());
         key_assignment_candidates(text.as_deref().unwrap_or_default(), current)
     })

@@ -44,7 +44,7 @@ pub fn estimate_bias(references: &IndependentReferences, pictures: &[RadianceIma
     }
     let pairs = PairwiseErrorProducts::from_images(references, pictures);
     let by_references = references.relmse_standard_error(&mean_image(pictures));
-    let by_seeds = pairs.mean_variance_if_unbiased().max(pairs.jackknife_variance_of_mean());
+    let by_seeds = pairs.variance_of_mean_if_unbiased().max(pairs.jackknife_variance_of_mean());
     let (size, error) = (pairs.mean(), (by_seeds + by_references * by_references).sqrt());
     let freedom = pictures.len() as f64 - 1.0;
     let p_value =
@@ -87,7 +87,7 @@ impl PairwiseErrorProducts {
 
     /// Returns the variance of the mean, assuming no bias. In that case, the products of different pairs are
     /// uncorrelated.
-    fn mean_variance_if_unbiased(&self) -> f64 {
+    fn variance_of_mean_if_unbiased(&self) -> f64 {
         let (mean, count) = (self.mean(), self.products.len() as f64);
         let squares: f64 =
             self.products.iter().map(|(_, _, product)| (product - mean) * (product - mean)).sum();

@@ -29,7 +29,7 @@ struct StepTarget {
 }
 
 /// Measurement of a method on a scene.
-pub(super) struct MethodRun<'a> {
+pub(super) struct MethodMeasurer<'a> {
     pub(super) run: &'a SceneRun<'a>,
     /// Overrides shared by all images and the references.
     pub(super) common: &'a Overrides,
@@ -41,7 +41,7 @@ pub(super) struct MethodRun<'a> {
     pub(super) max_samples: f64,
 }
 
-impl MethodRun<'_> {
+impl MethodMeasurer<'_> {
     /// Measures the method and sets `threads` to the number of rendering threads.
     pub(super) fn measure(
         &self,

@@ -73,7 +73,7 @@ pub(super) struct SceneReferences {
 pub(super) struct ReferenceFingerprints([Fingerprint; 2]);
 
 /// Rendered references that are not cached yet.
-pub(super) struct UnsavedReferences {
+pub(super) struct UncachedReferences {
     pub(super) keys: ReferenceFingerprints,
     stored: ReferencesWithCost,
     warnings: Vec<Diagnostic>,
@@ -138,7 +138,7 @@ impl ReferenceRenderer<'_> {
         session: &mut HeadlessSession,
         amount: ReferenceBudget,
         mut begin: impl FnMut(usize),
-    ) -> Result<UnsavedReferences, BenchError> {
+    ) -> Result<UncachedReferences, BenchError> {
         let half = ReferenceBudget { seconds: amount.seconds.map(|seconds| seconds / 2.0), ..amount };
         begin(2);
         let first = self.render_reference(session, SEEDS[0], half)?;
@@ -153,12 +153,12 @@ impl ReferenceRenderer<'_> {
             BenchError::Call(errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
         })?;
         let keys = ReferenceFingerprints([first.key, second.key]);
-        Ok(UnsavedReferences { keys, stored: ReferencesWithCost { pair, cost }, warnings: first.warnings })
+        Ok(UncachedReferences { keys, stored: ReferencesWithCost { pair, cost }, warnings: first.warnings })
     }
 
     /// Stores rendered references in the cache, if it is enabled.
-    pub(super) fn store_in_cache(&self, made: UnsavedReferences) -> SceneReferences {
-        let UnsavedReferences { keys, stored, warnings } = made;
+    pub(super) fn store_in_cache(&self, made: UncachedReferences) -> SceneReferences {
+        let UncachedReferences { keys, stored, warnings } = made;
         let cache_error = self
             .cache
             .and_then(|folder| cache::store(folder, &self.reference_cache_key(&keys), &stored).err());

@@ -199,7 +199,7 @@ pub(super) mod tests {
     use super::*;
 
     /// A synthetic step with three images whose errors are close to `relmse`.
-    pub(crate) fn step(samples: f64, seconds: f64, relmse: f64, bias: f64) -> StepResult {
+    pub(crate) fn synthetic_step_result(samples: f64, seconds: f64, relmse: f64, bias: f64) -> StepResult {
         let of = |(number, factor): (u32, f64)| ImageMeasurement {
             seed: number,
             samples,
@@ -226,8 +226,8 @@ pub(super) mod tests {
 
     /// A synthetic method with noise inversely proportional to time, plus a bias.
     pub(crate) fn method(name: &str, noise: f64, bias: f64) -> MethodAnalysis {
-        let steps =
-            [1.0, 4.0, 16.0, 64.0].map(|samples| step(samples, samples * 0.01, noise / samples + bias, bias));
+        let steps = [1.0, 4.0, 16.0, 64.0]
+            .map(|samples| synthetic_step_result(samples, samples * 0.01, noise / samples + bias, bias));
         MethodAnalysis::new(name.to_owned(), 0.003, steps.to_vec())
     }
 
@@ -259,7 +259,7 @@ pub(super) mod tests {
         let of = |sizes: &[f64]| {
             let steps: Vec<StepResult> = (0..)
                 .zip(sizes)
-                .map(|(n, size)| step(f64::from(1 << (2 * n)), 1.0, 0.01 + size, *size))
+                .map(|(n, size)| synthetic_step_result(f64::from(1 << (2 * n)), 1.0, 0.01 + size, *size))
                 .collect();
             BiasVerdict::from_steps(&steps)
         };

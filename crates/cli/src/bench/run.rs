@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use super::measure::MethodRun;
+use super::measure::MethodMeasurer;
 use super::methods::methods_to_measure;
 use super::reference::{
     ReferenceBudget, ReferenceFingerprints, ReferenceRenderer, SEEDS, SceneReferences, load_reference_files,
@@ -15,8 +15,8 @@ use super::request::{
 use super::results::{Results, SceneResult, StepResult};
 use super::time_budget::TimeBudget;
 use crate::control::CancelToken;
-use crate::pipeline::foreign_file_error;
 use crate::pipeline::headless::HeadlessSession;
+use crate::pipeline::not_a_scene_file_error;
 use crate::pipeline::protocol::Failure;
 use crate::pipeline::settings::Overrides;
 use crate::pipeline::words;
@@ -117,7 +117,7 @@ pub(super) struct SceneRun<'a> {
 }
 
 /// Error message for a scene that was saved while it was being measured.
-fn scene_changed_message(scene: &Path) -> String {
+fn changed_while_measured_message(scene: &Path) -> String {
     format!("{} or one of its files changed during the measurement; run the benchmark again", scene.display())
 }
 
@@ -136,7 +136,7 @@ impl SceneRun<'_> {
     fn load_and_validate(&self, session: &mut HeadlessSession) -> Result<ValidatedScene, BenchError> {
         let request = self.request;
         self.report_task_begin("reading", None);
-        let foreign = foreign_file_error(self.path).map_or(Ok(()), |error| Err(vec![error]));
+        let foreign = not_a_scene_file_error(self.path).map_or(Ok(()), |error| Err(vec![error]));
         let loaded = foreign
             .and_then(|()| scene::load(self.path, &request.common.sets))
             .map_err(|diagnostics| BenchError::Failed(Failure::Scene(diagnostics)))?;
@@ -196,7 +196,7 @@ impl SceneRun<'_> {
         let mut measured = Vec::new();
         for method in &methods {
             budget.begin_method();
-            let method = MethodRun {
+            let method = MethodMeasurer {
                 run: self,
                 common: &common,
                 method,
@@ -242,7 +242,7 @@ impl SceneRun<'_> {
 
     /// Returns the error for a scene that was saved while it was being measured.
     pub(super) fn scene_changed_error(&self) -> BenchError {
-        BenchError::Failed(Failure::Work(scene_changed_message(self.path)))
+        BenchError::Failed(Failure::Work(changed_while_measured_message(self.path)))
     }
 
     /// Checks that no output file is an input of the scene.
@@ -409,7 +409,7 @@ mod tests {
                 panic!("expected an error: saved at {moment}")
             };
             let BenchError::Failed(Failure::Work(message)) = &unfinished.error else { panic!("{moment}") };
-            assert_eq!(*message, scene_changed_message(&request.scenes[1]));
+            assert_eq!(*message, changed_while_measured_message(&request.scenes[1]));
             assert_eq!(unfinished.done.scenes.len(), 1);
             // References rendered from different versions are not cached.
             write(&request.scenes[1], "3");
@@ -440,7 +440,7 @@ mod tests {
         let BenchError::Failed(Failure::Work(message)) = &unfinished.error else {
             panic!("expected a work error")
         };
-        assert_eq!(*message, scene_changed_message(&request.scenes[0]));
+        assert_eq!(*message, changed_while_measured_message(&request.scenes[0]));
     }
 
     #[test]

@@ -28,7 +28,7 @@ fn format_scene(scene: &SceneResult) -> Vec<String> {
         "method", "samples", "seconds", "relMSE", "least", "greatest", "s × relMSE"
     ));
     for method in &scene.methods {
-        lines.extend(method.steps.iter().map(|step| format_step(&method.name, step, width)));
+        lines.extend(method.steps.iter().map(|step| format_step_row(&method.name, step, width)));
     }
     lines.push(String::new());
     for method in &scene.methods {
@@ -60,7 +60,7 @@ fn format_references(reference: &ReferenceResult, scene: &SceneResult) -> String
     format!("references: path, 2 × {samples:.0} samples ({times}), {noise}{cached}")
 }
 
-fn format_step(name: &str, step: &StepResult, width: usize) -> String {
+fn format_step_row(name: &str, step: &StepResult, width: usize) -> String {
     let [least, most] = step.spread;
     format!(
         "{name:<width$} {:>8} {:>9}  {:>9} {:>9} {:>9} {:>10}",

@@ -74,7 +74,7 @@ fn run_and_print_errors(args: &BenchArgs, console: &Console) -> Result<Exit, Exi
                 // Report files that cannot be written, but keep the exit code of the first error.
                 let _ = outputs.write_all(&done, &progress, console, &writing);
             }
-            Err(report_unfinished(&error, &ended, (done.scenes.len(), scenes), &progress, console))
+            Err(report_early_end(&error, &ended, (done.scenes.len(), scenes), &progress, console))
         }
     }
 }
@@ -124,7 +124,7 @@ fn unfinished_after_panic() -> PartialResultsError {
 
 /// Reports why the benchmark did not finish. `scenes` contains the number of measured scenes and the total
 /// number of scenes.
-fn report_unfinished(
+fn report_early_end(
     error: &BenchError,
     ended: &ReceivedSignal,
     scenes: (usize, usize),

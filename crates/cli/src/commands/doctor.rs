@@ -36,7 +36,7 @@ fn describe_simd_instructions() -> String {
         InstructionSet::Avx512 => "AVX-512",
     };
     let (used, best) =
-        (InstructionSet::from_environment_or_best(), InstructionSet::Avx512.or_best_supported());
+        (InstructionSet::from_environment_or_best(), InstructionSet::Avx512.or_best_if_unsupported());
     match nonempty_environment_variable("GLIMT_SIMD") {
         Some(asked) => format!("{} (GLIMT_SIMD={asked}); available: {}", words(used), words(best)),
         None => words(used).to_owned(),

@@ -12,7 +12,7 @@ use crate::tui::wrap_text;
 pub(crate) fn run(path: Option<&str>, console: &Console) -> Exit {
     let text = match path {
         None => Some(format_table_list()),
-        Some(path) => explain_path(path.trim_matches(['[', ']'])),
+        Some(path) => path_explanation(path.trim_matches(['[', ']'])),
     };
     match text {
         Some(text) => {
@@ -54,7 +54,7 @@ fn format_table_list() -> String {
 }
 
 /// Describes the key, type or table at this path, or returns `None` if the path is unknown.
-fn explain_path(path: &str) -> Option<String> {
+fn path_explanation(path: &str) -> Option<String> {
     let parts: Vec<&str> = path.split('.').collect();
     let found = |all: Vec<(String, &KeyInfo)>| match all.as_slice() {
         [] => None,
@@ -66,14 +66,15 @@ fn explain_path(path: &str) -> Option<String> {
     };
     match parts.as_slice() {
         [group, _, inner, rest @ ..] if find_table(group)?.find_inner_table(inner).is_some() => {
-            explain_path(&[&[*inner], rest].concat().join("."))
+            path_explanation(&[&[*inner], rest].concat().join("."))
         }
         [name] => match find_table(name) {
             Some(table) => Some(table_details(table)),
             None if all_tables().iter().any(|table| defines_type_named(table, name)) => {
                 let types = all_tables().iter().filter(|table| defines_type_named(table, name));
-                let texts = types
-                    .filter_map(|table| Some(type_details(table, table.find_type_or_default(Some(name))?)));
+                let texts = types.filter_map(|table| {
+                    Some(table_type_details(table, table.find_type_or_default(Some(name))?))
+                });
                 Some(texts.collect::<Vec<_>>().join("\n"))
             }
             None => {
@@ -87,7 +88,7 @@ fn explain_path(path: &str) -> Option<String> {
                 return Some(table_details(table));
             }
             if let Some(kind) = table.find_type_or_default(Some(second)) {
-                return Some(type_details(table, kind));
+                return Some(table_type_details(table, kind));
             }
             if *second == "type" && !table.types.is_empty() {
                 return Some(format_type_list(table));
@@ -194,7 +195,7 @@ fn format_type_list(table: &TableInfo) -> String {
 }
 
 /// Describes a type, with one line for each of its keys and each common key.
-fn type_details(table: &'static TableInfo, kind: &'static TableTypeInfo) -> String {
+fn table_type_details(table: &'static TableInfo, kind: &'static TableTypeInfo) -> String {
     let head = format!(
         "{}, type = \"{}\"\n    {}\n\n",
         table.header(),
@@ -249,25 +250,25 @@ mod tests {
 
     #[test]
     fn partial_paths_find_keys() {
-        let text = explain_path("materials.metal.roughness").expect("a key");
+        let text = path_explanation("materials.metal.roughness").expect("a key");
         for part in ["0 … 1", "default  0.2", "number or texture", "roughness = 0.2"] {
             assert!(text.contains(part), "{part}: {text}");
         }
-        let all = explain_path("materials.roughness").expect("keys");
+        let all = path_explanation("materials.roughness").expect("keys");
         assert!(
             ["glass", "metal", "plastic", "principled"]
                 .iter()
                 .all(|kind| all.contains(&format!("materials.{kind}.roughness")))
         );
-        assert!(explain_path("roughness").is_some_and(|alone| alone == all));
-        assert!(explain_path("materials.metal.emission").is_some_and(|text| text.contains("radiance")));
-        assert!(explain_path("render.integrator").is_some_and(|text| text.contains("\"path\"")));
-        assert!(explain_path("materials.type").is_some_and(|text| text.contains("type = \"glass\"")));
+        assert!(path_explanation("roughness").is_some_and(|alone| alone == all));
+        assert!(path_explanation("materials.metal.emission").is_some_and(|text| text.contains("radiance")));
+        assert!(path_explanation("render.integrator").is_some_and(|text| text.contains("\"path\"")));
+        assert!(path_explanation("materials.type").is_some_and(|text| text.contains("type = \"glass\"")));
     }
 
     #[test]
     fn ambiguous_keys_are_summarized_in_two_lines() {
-        let text = explain_path("radius").expect("keys");
+        let text = path_explanation("radius").expect("keys");
         assert!(text.starts_with("photons.radius: number; length; 0 …; default 0.0\n    Kernel"), "{text}");
         assert!(text.contains("\nsphere.radius: number; length; > 0; required\n"), "{text}");
         assert!(text.lines().count() < 20 && text.ends_with(": glimt explain photons.radius\n"), "{text}");
@@ -281,7 +282,7 @@ mod tests {
         assert_eq!(wrap_with_hanging_indents(text, 34), expected);
         assert_eq!(wrap_with_hanging_indents(text, 10), text, "too narrow to wrap");
         for (path, _) in all_paths_with_descriptions() {
-            let text = wrap_with_hanging_indents(&explain_path(&path).unwrap_or_default(), 80);
+            let text = wrap_with_hanging_indents(&path_explanation(&path).unwrap_or_default(), 80);
             let broken: Vec<&str> = text.lines().filter(|line| line.chars().count() > 80).collect();
             assert!(broken.is_empty(), "{broken:?}");
         }
@@ -290,16 +291,16 @@ mod tests {
     #[test]
     fn every_path_is_explained() {
         for (path, doc) in all_paths_with_descriptions() {
-            let text = explain_path(&path).unwrap_or_default();
+            let text = path_explanation(&path).unwrap_or_default();
             assert!(text.contains(&without_backticks(doc)), "{path}: {text}");
         }
-        assert!(explain_path("phong").is_some_and(|text| text.contains("shininess")));
-        assert_eq!(explain_path("materials.metal.type"), explain_path("materials.type"));
-        assert!(explain_path("groups").is_some_and(|text| text.contains("[[groups.NAME.sphere]]")));
-        assert_eq!(explain_path("groups.stool"), explain_path("groups"));
-        assert_eq!(explain_path("groups.stool.sphere.radius"), explain_path("sphere.radius"));
-        assert_eq!(explain_path("nothing"), None);
-        assert_eq!(explain_path("materials.gold.roughness"), None);
+        assert!(path_explanation("phong").is_some_and(|text| text.contains("shininess")));
+        assert_eq!(path_explanation("materials.metal.type"), path_explanation("materials.type"));
+        assert!(path_explanation("groups").is_some_and(|text| text.contains("[[groups.NAME.sphere]]")));
+        assert_eq!(path_explanation("groups.stool"), path_explanation("groups"));
+        assert_eq!(path_explanation("groups.stool.sphere.radius"), path_explanation("sphere.radius"));
+        assert_eq!(path_explanation("nothing"), None);
+        assert_eq!(path_explanation("materials.gold.roughness"), None);
     }
 
     #[test]

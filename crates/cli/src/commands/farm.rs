@@ -32,7 +32,7 @@ pub(crate) fn run(args: &FarmArgs, console: &Console) -> Exit {
     };
     console.print_trusted_text(&match args.engine {
         ClusterScheduler::Slurm => slurm_script(args),
-        ClusterScheduler::Parallel => parallel_script(args),
+        ClusterScheduler::Parallel => gnu_parallel_script(args),
         ClusterScheduler::Kubernetes => kubernetes_manifest(args, memory_request(args, &options, console)),
     });
     Exit::DONE
@@ -170,7 +170,7 @@ echo \"parts: job $parts; merge: job $merge\"
     )
 }
 
-fn parallel_script(args: &FarmArgs) -> String {
+fn gnu_parallel_script(args: &FarmArgs) -> String {
     let (count, merge) = (args.shards, parts_merge_command(args, ""));
     // Pass one command per line, because parallel would expand braces in file names inside a command
     // template.
@@ -290,7 +290,7 @@ mod tests {
     fn parallel_does_not_expand_names() {
         let name = "{= `touch pwned` =}{}{1} it's.toml";
         let args = args(&format!("{} -o 'a {{}}.exr' --shards 2 --engine parallel", quote_word(name)));
-        let script = parallel_script(&args);
+        let script = gnu_parallel_script(&args);
         let lines = script.lines().find(|line| line.starts_with("seq 2 | while")).expect("the commands");
         let lines = lines.strip_suffix(" |").expect("a pipe");
         let printed = std::process::Command::new("sh").args(["-c", lines]).output().expect("a shell");

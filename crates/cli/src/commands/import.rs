@@ -15,7 +15,7 @@ use crate::pipeline::{
     import_scene,
 };
 use crate::scene::diagnostic::Diagnostic;
-use crate::scene::has_scene_extension;
+use crate::scene::has_toml_extension;
 use crate::signals;
 
 pub(crate) fn run(args: &ImportArgs, console: &Console) -> Exit {
@@ -28,7 +28,7 @@ fn convert_and_write(args: &ImportArgs, console: &Console, token: &CancelToken) 
         Some(output) => output.clone(),
         None => PathBuf::from(args.file.with_extension("toml").file_name().unwrap_or_default()),
     };
-    let Some(name) = scene.file_stem().filter(|_| has_scene_extension(&scene)) else {
+    let Some(name) = scene.file_stem().filter(|_| has_toml_extension(&scene)) else {
         let shown = scene.display();
         return console
             .print_error(Exit::WRONG, &format!("{shown} is not a scene file name: it must end in .toml"));

@@ -20,7 +20,7 @@ pub(crate) fn run(args: &InfoArgs, console: &Console) -> Exit {
         Err(error) => return console.print_error(Exit::WRONG, &error.to_string()),
     };
     if args.json {
-        match to_pretty_text(&as_json(&args.image, &info)) {
+        match to_pretty_text(&image_info_to_json(&args.image, &info)) {
             Ok(text) => console.print_trusted_text(&text),
             Err(error) => return console.print_error(Exit::FAILED, &error.to_string()),
         }
@@ -50,7 +50,7 @@ pub(crate) fn report_image_instead_of_scene(path: &Path, is_json: bool, console:
     let info = read_image_info_or_format(path);
     if is_json {
         let mut value = failure_to_json(&Failure::Scene(vec![*problem]));
-        value["image"] = info.map_or(Value::Null, |info| as_json(path, &info));
+        value["image"] = info.map_or(Value::Null, |info| image_info_to_json(path, &info));
         json_line(&value);
     } else {
         console.print_diagnostics(&[*problem]);
@@ -61,7 +61,7 @@ pub(crate) fn report_image_instead_of_scene(path: &Path, is_json: bool, console:
     Some(Exit::WRONG)
 }
 
-fn as_json(path: &Path, info: &ImageFileInfo) -> Value {
+fn image_info_to_json(path: &Path, info: &ImageFileInfo) -> Value {
     let settings: Map<String, Value> =
         info.settings.iter().map(|(name, value)| (name.clone(), Value::from(value.as_str()))).collect();
     json!({

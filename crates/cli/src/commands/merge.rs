@@ -171,7 +171,7 @@ impl MergeCommand<'_> {
                 let is_new = reported.is_none_or(|(count, _)| count != parts.len());
                 let words = self.describe_completed_parts(parts.len(), &unfinished);
                 if self.redraws_image_in_place() {
-                    self.redraw_image(&parts, &words, &mut block)?;
+                    self.redraw_terminal_image(&parts, &words, &mut block)?;
                 } else if is_new {
                     // Report mismatched parts as soon as they appear.
                     part::check_and_list_missing(&parts).map_err(|error| self.report_part_error(&error))?;
@@ -182,11 +182,11 @@ impl MergeCommand<'_> {
             if waiting.is_empty() {
                 return Ok(parts);
             }
-            self.wait_poll_interval()?;
+            self.sleep_until_next_poll()?;
         }
     }
 
-    fn wait_poll_interval(&self) -> Result<(), Exit> {
+    fn sleep_until_next_poll(&self) -> Result<(), Exit> {
         let end = Instant::now() + POLL_INTERVAL;
         while Instant::now() < end {
             if self.token.is_canceled() {
@@ -233,7 +233,7 @@ impl MergeCommand<'_> {
     }
 
     /// Redraws the image merged from these parts, with a title.
-    fn redraw_image(
+    fn redraw_terminal_image(
         &self,
         parts: &[PartFile],
         words: &str,
@@ -271,7 +271,7 @@ impl MergeCommand<'_> {
     ) -> Result<MergedParts, Exit> {
         let mut bar = StepProgressBar::new(self.args.progress, self.console, what);
         let tell = |tile: usize, film: &Film| bar.update(tile, film.tile_count());
-        let merged = part::merge_into_film(parts, is_partial, self.token, tell);
+        let merged = part::merge_parts(parts, is_partial, self.token, tell);
         bar.end();
         merged.map_err(|error| self.report_part_error(&error))
     }

@@ -58,7 +58,7 @@ pub(crate) fn run(file: &Path, with_schema: bool, console: &Console) -> Exit {
         }
         Err(source) => {
             // Prefer the more specific error about the folder.
-            let of_place = output::check_output_path(file).err();
+            let of_place = output::check_output_is_writable(file).err();
             let error = of_place.unwrap_or_else(|| OutputError::File { path: file.to_owned(), source });
             console.print_error(Exit::FAILED, &error.to_string())
         }

@@ -18,14 +18,14 @@ thread_local! {
 ///
 /// The panic message.
 pub fn catch_panic<T>(work: impl FnOnce() -> T) -> Result<T, String> {
-    silence_caught_panics();
+    install_silencing_hook();
     let outer = IS_CATCHING.replace(true);
     let result = panic::catch_unwind(AssertUnwindSafe(work));
     IS_CATCHING.set(outer);
     result.map_err(|payload| panic_message(payload.as_ref()))
 }
 
-fn silence_caught_panics() {
+fn install_silencing_hook() {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {
         let previous = panic::take_hook();

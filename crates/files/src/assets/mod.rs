@@ -105,7 +105,7 @@ impl AssetError {
 
 /// Returns the line number and reason from the error for a rejected file.
 #[cfg(test)]
-pub(crate) fn rejection<T: std::fmt::Debug>(result: Result<T, AssetError>) -> (Option<usize>, String) {
+pub(crate) fn expect_rejection<T: std::fmt::Debug>(result: Result<T, AssetError>) -> (Option<usize>, String) {
     match result {
         Err(AssetError::Malformed { line, reason, .. }) => (line, reason),
         Err(AssetError::Unreadable { reason, .. }) => (None, reason),

@@ -36,8 +36,11 @@ const DEFAULT_FIELD: [f64; 3] = [45.0, 1024.0, 640.0];
 /// of values is wrong, or a value is not finite or out of range.
 pub fn load(path: &Path) -> Result<(GkitOrbiterCamera, FileHash), AssetError> {
     let token = CancelToken::new();
-    let bytes =
-        read::read_text(path, MAX_FILE_BYTES, read::Monitor { progress: &ignore_progress, token: &token })?;
+    let bytes = read::read_text_bytes(
+        path,
+        MAX_FILE_BYTES,
+        read::Monitor { progress: &ignore_progress, token: &token },
+    )?;
     Ok((parse_orbiter_camera(path, &String::from_utf8_lossy(&bytes))?, read::hash_bytes(&bytes)))
 }
 
@@ -145,10 +148,10 @@ fn check_fov_and_image_size(numbers: Result<[f64; 3], String>) -> Result<[f64; 3
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::assets::rejection;
+    use crate::assets::expect_rejection;
 
     fn error(text: &str) -> (Option<usize>, String) {
-        rejection(parse_orbiter_camera(Path::new("cam.txt"), text))
+        expect_rejection(parse_orbiter_camera(Path::new("cam.txt"), text))
     }
 
     #[test]

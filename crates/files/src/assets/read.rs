@@ -69,7 +69,7 @@ pub(crate) fn open_regular_with_limit(path: &Path, limit: u64) -> Result<(File, 
 const CHECKED_BYTES: usize = 1 << 12;
 
 /// Reads a text file. Rejects binary files based on their first [`CHECKED_BYTES`] bytes.
-pub(crate) fn read_text(path: &Path, limit: u64, monitor: Monitor<'_>) -> Result<Vec<u8>, AssetError> {
+pub(crate) fn read_text_bytes(path: &Path, limit: u64, monitor: Monitor<'_>) -> Result<Vec<u8>, AssetError> {
     read_if_start_accepted(path, limit, monitor, |start| {
         reject_utf16(path, start)?;
         reject_as_binary_if(path, start.contains(&0))
@@ -171,7 +171,7 @@ pub(crate) fn read_rest(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::assets::rejection;
+    use crate::assets::expect_rejection;
     use crate::control::ignore_progress;
     use crate::system::describe_error;
     use std::fs;
@@ -185,7 +185,7 @@ mod tests {
     fn unsuitable_files_are_rejected() {
         let folder = tempfile::tempdir().expect("a folder");
         let token = CancelToken::new();
-        let reason = |path: &Path| rejection(read_bytes(path, 100, monitor(&token))).1;
+        let reason = |path: &Path| expect_rejection(read_bytes(path, 100, monitor(&token))).1;
         assert_eq!(reason(folder.path()), not_regular_file_message(FileKind::Folder));
         let missing = std::io::Error::from_raw_os_error(nix::libc::ENOENT);
         assert_eq!(reason(&folder.path().join("none.obj")), describe_error(&missing));
@@ -201,15 +201,15 @@ mod tests {
         let path = folder.path().join("zeros");
         // A sparse file of 3 TiB, which would take an hour to read completely.
         File::create(&path).and_then(|file| file.set_len(3 << 40)).expect("a sparse file");
-        for read in [read_text, read_unless_zeros_in_magic] {
-            let error = rejection(read(&path, u64::MAX, monitor(&token)));
+        for read in [read_text_bytes, read_unless_zeros_in_magic] {
+            let error = expect_rejection(read(&path, u64::MAX, monitor(&token)));
             assert_eq!(error, (Some(1), BINARY_FILE.to_owned()));
         }
         fs::write(&path, b"ply\n\0").expect("written");
-        assert!(read_text(&path, 100, monitor(&token)).is_err());
+        assert!(read_text_bytes(&path, 100, monitor(&token)).is_err());
         assert_eq!(read_unless_zeros_in_magic(&path, 100, monitor(&token)).expect("read"), b"ply\n\0");
         fs::write(&path, b"").expect("written");
-        assert_eq!(read_text(&path, 100, monitor(&token)).expect("read"), b"");
+        assert_eq!(read_text_bytes(&path, 100, monitor(&token)).expect("read"), b"");
     }
 
     #[test]
@@ -223,8 +223,8 @@ mod tests {
             let big: Vec<u8> = words().encode_utf16().flat_map(u16::to_be_bytes).collect();
             for bytes in [little, big] {
                 fs::write(&path, bytes).expect("written");
-                for read in [read_text, read_unless_zeros_in_magic] {
-                    let error = rejection(read(&path, u64::MAX, monitor(&token)));
+                for read in [read_text_bytes, read_unless_zeros_in_magic] {
+                    let error = expect_rejection(read(&path, u64::MAX, monitor(&token)));
                     assert_eq!(error, (Some(1), UTF16_TEXT.to_owned()));
                 }
             }
@@ -252,8 +252,8 @@ mod tests {
         let path = folder.path().join("pointer");
         let pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n";
         fs::write(&path, pointer).expect("written");
-        for read in [read_text, read_unless_zeros_in_magic, read_unless_zeros_at_start, read_bytes] {
-            let error = rejection(read(&path, 1 << 20, monitor(&token)));
+        for read in [read_text_bytes, read_unless_zeros_in_magic, read_unless_zeros_at_start, read_bytes] {
+            let error = expect_rejection(read(&path, 1 << 20, monitor(&token)));
             assert_eq!(error, (None, LFS_POINTER.to_owned()));
         }
         fs::write(&path, format!("{pointer}{}", "x".repeat(1024))).expect("written");
@@ -265,7 +265,7 @@ mod tests {
     fn pipes_and_link_loops_do_not_block() {
         let folder = tempfile::tempdir().expect("a folder");
         let token = CancelToken::new();
-        let reason = |path: &Path| rejection(read_bytes(path, 100, monitor(&token))).1;
+        let reason = |path: &Path| expect_rejection(read_bytes(path, 100, monitor(&token))).1;
         let pipe = folder.path().join("pipe");
         nix::unistd::mkfifo(&pipe, nix::sys::stat::Mode::S_IRWXU).expect("a pipe");
         assert_eq!(reason(&pipe), not_regular_file_message(FileKind::Special));

@@ -25,7 +25,7 @@ pub struct TextFile {
 pub fn read_text_file(path: &Path, limit: u64, token: &CancelToken) -> Result<TextFile, AssetError> {
     let stamp = FileStamp::from_path(path);
     let monitor = read::Monitor { progress: &ignore_progress, token };
-    let bytes = read::read_text(path, limit, monitor)?;
+    let bytes = read::read_text_bytes(path, limit, monitor)?;
     let hash = read::hash_bytes(&bytes);
     let text = String::from_utf8(bytes).map_err(|error| {
         let valid = &error.as_bytes()[..error.utf8_error().valid_up_to()];

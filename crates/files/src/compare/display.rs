@@ -94,13 +94,13 @@ fn tile_lumas_and_squared_error(pair: &ImagePair, tile: Rect) -> (f64, [Plane; 2
     let mut square = 0.0;
     let width = side(tile.width);
     for row in 0..side(tile.height) {
-        let Some(y) = padded_tile_to_image_coordinate(tile.y, row, pair.height()) else { continue };
+        let Some(y) = image_coordinate_if_inside(tile.y, row, pair.height()) else { continue };
         for column in 0..width {
-            let Some(x) = padded_tile_to_image_coordinate(tile.x, column, pair.width()) else { continue };
+            let Some(x) = image_coordinate_if_inside(tile.x, column, pair.width()) else { continue };
             let [a, b] = pair.pixel_pair(x, y).map(encode_srgb);
             lumas[0].values[row * width + column] = luma(a);
             lumas[1].values[row * width + column] = luma(b);
-            if is_inside_tile(row, tile.height) && is_inside_tile(column, tile.width) {
+            if is_coordinate_inside_tile(row, tile.height) && is_coordinate_inside_tile(column, tile.width) {
                 square += a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
             }
         }
@@ -110,11 +110,11 @@ fn tile_lumas_and_squared_error(pair: &ImagePair, tile: Rect) -> (f64, [Plane; 2
 
 /// Converts a coordinate in a tile padded by its margin to an image coordinate. Returns `None` if the result
 /// is outside the image.
-fn padded_tile_to_image_coordinate(start: u32, offset: usize, length: usize) -> Option<usize> {
+fn image_coordinate_if_inside(start: u32, offset: usize, length: usize) -> Option<usize> {
     (start as usize + offset).checked_sub(RADIUS).filter(|&position| position < length)
 }
 
-fn is_inside_tile(offset: usize, length: u32) -> bool {
+fn is_coordinate_inside_tile(offset: usize, length: u32) -> bool {
     (RADIUS..RADIUS + length as usize).contains(&offset)
 }
 

@@ -56,7 +56,7 @@ impl FilmEncodingSettings {
         let range = tone.range_map.range();
         let range = range.map(|range| format!("{} to {}", range.min, range.max));
         metadata.extend(range.map(|range| ("glimt:range".to_owned(), range)));
-        let mean_luminance_error = if self.is_light { film.mean_luminance_error() } else { None };
+        let mean_luminance_error = if self.is_light { film.mean_luminance_standard_error() } else { None };
         let options = EncodeOptions { tone, bit_depth: self.bit_depth, metadata, mean_luminance_error };
         encode_with_layers(image, layers, &options, format, token)
     }

@@ -10,13 +10,13 @@ use crate::system::{RAISE_FILE_LIMIT, describe_error, is_too_many_open_files};
 #[derive(Debug, thiserror::Error)]
 pub enum OutputError {
     /// The path has no file name extension.
-    #[error("cannot write {}: it has no file extension; use one of {}", path.display(), Format::describe_extensions())]
+    #[error("cannot write {}: it has no file extension; use one of {}", path.display(), Format::list_known_extensions())]
     NoExtension {
         /// The path.
         path: PathBuf,
     },
     /// No format has this extension.
-    #[error("cannot write {}: .{extension} is not a supported format; use one of {}", path.display(), Format::describe_extensions())]
+    #[error("cannot write {}: .{extension} is not a supported format; use one of {}", path.display(), Format::list_known_extensions())]
     UnknownExtension {
         /// The path.
         path: PathBuf,

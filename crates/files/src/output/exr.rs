@@ -21,7 +21,7 @@ use flate2::write::ZlibEncoder;
 use rayon::prelude::*;
 
 use super::cancelable::CancelableBuffer;
-use super::{EncodeOptions, Format, LayerImage, OutputError, SOFTWARE, one_line, replace_non_finite};
+use super::{EncodeOptions, Format, LayerImage, OutputError, SOFTWARE, one_line, to_finite};
 use crate::control::CancelToken;
 use crate::film::RadianceImage;
 
@@ -116,7 +116,7 @@ fn write_blocks(
 /// Compresses a block of scan lines as ZIP: applies the predictor and deflates the result. The encoder's own
 /// function uses a higher level, which takes several times as long.
 fn compress_scan_lines(index: BlockIndex, channels: &[Channel<'_>]) -> ::exr::error::Result<Chunk> {
-    let samples = encode_block_scan_lines(index, channels);
+    let samples = block_samples_to_le_bytes(index, channels);
     let deflated = Vec::with_capacity(samples.len());
     let mut encoder = ZlibEncoder::new(deflated, Compression::fast());
     let deflated =
@@ -129,14 +129,14 @@ fn compress_scan_lines(index: BlockIndex, channels: &[Channel<'_>]) -> ::exr::er
 }
 
 /// The samples of a block, line by line and channel by channel, as little-endian bytes.
-fn encode_block_scan_lines(index: BlockIndex, channels: &[Channel<'_>]) -> Vec<u8> {
+fn block_samples_to_le_bytes(index: BlockIndex, channels: &[Channel<'_>]) -> Vec<u8> {
     let (top, Vec2(width, height)) = (index.pixel_position.y(), index.pixel_size);
     let mut bytes = vec![0; width * height * channels.len() * size_of::<f32>()];
     let lines = (top..top + height).flat_map(|line| channels.iter().map(move |channel| (line, channel)));
     for (bytes, (line, channel)) in bytes.chunks_exact_mut(width * size_of::<f32>()).zip(lines) {
         let pixels = channel.image.pixels.iter().skip(line * width);
         for (bytes, pixel) in bytes.as_chunks_mut().0.iter_mut().zip(pixels) {
-            *bytes = replace_non_finite(pixel.as_ref()[channel.component]).to_le_bytes();
+            *bytes = to_finite(pixel.as_ref()[channel.component]).to_le_bytes();
         }
     }
     bytes

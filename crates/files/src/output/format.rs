@@ -62,7 +62,7 @@ impl Format {
     }
 
     /// Lists the known extensions for messages.
-    pub(super) fn describe_extensions() -> String {
+    pub(super) fn list_known_extensions() -> String {
         Self::EXTENSIONS.map(|(extension, _)| format!(".{extension}")).join(", ")
     }
 

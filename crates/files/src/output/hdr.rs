@@ -1,7 +1,7 @@
 //! Radiance HDR (G. Ward, *Real Pixels*, Graphics Gems II, 1991): three mantissas and a shared exponent per
 //! pixel, with run-length encoded scanlines. Negative values are clamped to 0.
 
-use super::{EncodeOptions, OutputError, SOFTWARE, one_line, replace_non_finite};
+use super::{EncodeOptions, OutputError, SOFTWARE, one_line, to_finite};
 use crate::control::CancelToken;
 use crate::film::RadianceImage;
 use crate::math::Vec3;
@@ -46,7 +46,7 @@ fn encode_scanline(line: &[Vec3], bytes: &mut Vec<u8>) {
 
 /// Encodes a color. Mantissas are rounded to nearest, which keeps decoded values unbiased.
 fn rgbe(color: Vec3) -> [u8; 4] {
-    let color = color.to_array().map(|component| f64::from(replace_non_finite(component).max(0.0)));
+    let color = color.to_array().map(|component| f64::from(to_finite(component).max(0.0)));
     let brightest = color[0].max(color[1]).max(color[2]);
     // 2^(exponent − 1) ≤ brightest < 2^exponent. Increase the exponent by 1 if the mantissa would round up to
     // 256.

@@ -158,12 +158,12 @@ pub fn check_file_target_without_writing(path: &Path) -> Result<(), OutputError>
 ///
 /// # Errors
 /// Same as [`check_image_target`], but the extension is not checked.
-pub fn check_output_path(path: &Path) -> Result<(), OutputError> {
+pub fn check_output_is_writable(path: &Path) -> Result<(), OutputError> {
     resolve_path::check_writable(path)
 }
 
 /// Replaces NaN with 0 and infinities with the largest finite value.
-fn replace_non_finite(component: f32) -> f32 {
+fn to_finite(component: f32) -> f32 {
     if component.is_nan() { 0.0 } else { component.clamp(-f32::MAX, f32::MAX) }
 }
 

@@ -7,7 +7,7 @@ use super::surface_of_revolution::{
     self, AxialFrame, LineInterval, LocalLine, direction_at_u, is_within_rounding_error,
     projected_area_of_normal_ring, radial_direction_toward, sine_from_cosine, u_from_direction,
 };
-use super::surface_packet::{SurfaceF64, SurfacePointF64};
+use super::surface_packet::{SurfacePointF64, SurfacePointsInF64};
 use super::{Aabb, RayF64, ShapeHit, SurfacePoint, SurfaceSample};
 use crate::math::{DVec2, DVec3, Vec2};
 
@@ -27,7 +27,7 @@ pub struct Cone {
     capped: bool,
 }
 
-impl SurfaceF64 for Cone {
+impl SurfacePointsInF64 for Cone {
     fn surface_point_f64(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
         let point = self.unrounded_hit_point(ray, hit);
         if hit.primitive > 0 {
@@ -36,7 +36,7 @@ impl SurfaceF64 for Cone {
         let local = self.frame.point_to_local(point);
         self.side_point_from_slant_f64(
             radial_direction_toward(local.truncate()),
-            self.slant_direction_and_distance(local),
+            self.slant_vector_and_tip_distance(local),
         )
     }
 }
@@ -128,7 +128,7 @@ impl Cone {
         }
         let local = self.frame.point_to_local(point);
         let out = radial_direction_toward(local.truncate());
-        let (down, along) = self.slant_direction_and_distance(local);
+        let (down, along) = self.slant_vector_and_tip_distance(local);
         let around = out.perp() * (-TAU * down.x * along);
         let SurfacePointF64 { point, normal, reach } = self.side_point_from_slant_f64(out, (down, along));
         SurfacePoint::from_f64(
@@ -142,7 +142,7 @@ impl Cone {
     }
 
     /// Computes the point on the side from a direction perpendicular to the axis and the result of
-    /// [`Cone::slant_direction_and_distance`].
+    /// [`Cone::slant_vector_and_tip_distance`].
     fn side_point_from_slant_f64(&self, out: DVec2, (down, along): (DVec2, f64)) -> SurfacePointF64 {
         SurfacePointF64 {
             point: self.frame.point_to_world((out * (down.x * along)).extend(down.y * along)),
@@ -153,7 +153,7 @@ impl Cone {
 
     /// Unit vector down the side from the tip, as (outward, along the axis), and the distance of `local` from
     /// the tip along the side.
-    fn slant_direction_and_distance(&self, local: DVec3) -> (DVec2, f64) {
+    fn slant_vector_and_tip_distance(&self, local: DVec3) -> (DVec2, f64) {
         let down = DVec2::new(self.radius, self.height) / self.slant;
         (down, DVec2::new(local.truncate().length(), local.z).dot(down).clamp(0.0, self.slant))
     }
@@ -166,7 +166,7 @@ impl Cone {
         if self.capped && below.abs() < off_side.abs() {
             return self.base_disk().uv_at_point(point);
         }
-        let (_, along) = self.slant_direction_and_distance(local);
+        let (_, along) = self.slant_vector_and_tip_distance(local);
         DVec2::new(
             u_from_direction(mirror_y(radial_direction_toward(local.truncate()))),
             1.0 - along / self.slant,
@@ -259,7 +259,7 @@ impl Cone {
     }
 
     /// Whether a point is inside.
-    pub fn encloses(&self, point: DVec3) -> bool {
+    pub fn volume_contains(&self, point: DVec3) -> bool {
         let p = self.frame.point_to_local(point);
         p.z < self.height && p.truncate().length() < self.radius / self.height * p.z
     }
@@ -280,7 +280,7 @@ fn mirror_y(p: DVec2) -> DVec2 {
 mod tests {
     use super::*;
     use crate::geometry::Ray;
-    use crate::geometry::surface_of_revolution::tests::{ThinShape, hits_from_afar};
+    use crate::geometry::surface_of_revolution::tests::{SlenderShape, check_hits_from_afar};
     use crate::math::Vec3;
 
     /// A cone with its tip at y = 2 and a base of radius 1 at y = 0.
@@ -356,7 +356,7 @@ mod tests {
         assert!((slanting.max - Vec3::new(3.0, 4.0, 1.0)).abs().max_element() < 1e-6);
     }
 
-    impl ThinShape for Cone {
+    impl SlenderShape for Cone {
         fn thin(radius: f64, capped: bool) -> Self {
             Self::new(DVec3::NEG_Z, DVec3::Z, radius, capped)
         }
@@ -376,6 +376,6 @@ mod tests {
 
     #[test]
     fn distant_hits_use_the_correct_crossing() {
-        hits_from_afar::<Cone>();
+        check_hits_from_afar::<Cone>();
     }
 }

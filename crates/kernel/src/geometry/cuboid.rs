@@ -2,7 +2,7 @@
 
 use super::packet::{F32x16, HitPacket, RayPacket, round_t_to_f32_or_nan};
 use super::surface::tangents_from_normal;
-use super::surface_packet::{SurfaceF64, SurfacePointF64};
+use super::surface_packet::{SurfacePointF64, SurfacePointsInF64};
 use super::{Aabb, RayF64, ShapeHit, SurfacePoint, SurfaceSample};
 use crate::math::transform::rotation_xyz;
 use crate::math::{DMat3, DVec2, DVec3, Vec2};
@@ -193,7 +193,7 @@ impl OrientedBox {
     }
 
     /// Whether a point is inside.
-    pub fn encloses(&self, point: DVec3) -> bool {
+    pub fn volume_contains(&self, point: DVec3) -> bool {
         (self.axes.transpose() * (point - self.center)).abs().cmplt(self.half).all()
     }
 
@@ -227,7 +227,7 @@ fn face_axis_and_normal(face: u32) -> (usize, DVec3) {
     (axis, normal)
 }
 
-impl SurfaceF64 for OrientedBox {
+impl SurfacePointsInF64 for OrientedBox {
     #[inline(always)]
     fn surface_point_f64(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
         let (local, n) = (self.local_hit_point(ray, hit), branchless_face_normal(hit.primitive));

@@ -7,7 +7,7 @@ use super::surface_of_revolution::{
     self, AxialFrame, LineInterval, LocalLine, direction_at_u, is_within_rounding_error,
     projected_area_of_normal_ring, radial_direction_toward, sine_from_cosine, u_from_direction,
 };
-use super::surface_packet::{SurfaceF64, SurfacePointF64};
+use super::surface_packet::{SurfacePointF64, SurfacePointsInF64};
 use super::{Aabb, RayF64, ShapeHit, SurfacePoint, SurfaceSample};
 use crate::math::{DVec2, DVec3, Vec2};
 
@@ -25,7 +25,7 @@ pub struct Cylinder {
     capped: bool,
 }
 
-impl SurfaceF64 for Cylinder {
+impl SurfacePointsInF64 for Cylinder {
     fn surface_point_f64(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
         let point = self.unrounded_hit_point(ray, hit);
         if hit.primitive > 0 {
@@ -223,7 +223,7 @@ impl Cylinder {
     }
 
     /// Whether a point is inside.
-    pub fn encloses(&self, point: DVec3) -> bool {
+    pub fn volume_contains(&self, point: DVec3) -> bool {
         // The height test rejects most points.
         self.frame.height(point).abs() < self.half_length
             && self.frame.point_to_local(point).truncate().length() < self.radius
@@ -240,7 +240,7 @@ impl Cylinder {
 mod tests {
     use super::*;
     use crate::geometry::Ray;
-    use crate::geometry::surface_of_revolution::tests::{ThinShape, hits_from_afar};
+    use crate::geometry::surface_of_revolution::tests::{SlenderShape, check_hits_from_afar};
     use crate::math::Vec3;
 
     /// A cylinder around the axis x = 1, z = 0, from y = 0 to y = 4.
@@ -298,7 +298,7 @@ mod tests {
         assert!((slanting.max - Vec3::new(3.8, 4.6, 1.0)).abs().max_element() < 1e-6);
     }
 
-    impl ThinShape for Cylinder {
+    impl SlenderShape for Cylinder {
         fn thin(radius: f64, capped: bool) -> Self {
             Self::new(DVec3::NEG_Z, DVec3::Z, radius, capped)
         }
@@ -318,6 +318,6 @@ mod tests {
 
     #[test]
     fn distant_hits_use_the_correct_crossing() {
-        hits_from_afar::<Cylinder>();
+        check_hits_from_afar::<Cylinder>();
     }
 }

@@ -2,10 +2,10 @@
 
 use std::f64::consts::PI;
 
-use super::local_geometry::{FlatOrRoundExtent, LocalGeometry, NearestSurface};
+use super::local_geometry::{FlatOrRoundExtent, NearbyGeometry, NearestSurface};
 use super::packet::{F32x16, HitPacket, RayPacket, round_t_to_f32_or_nan};
 use super::surface_of_revolution::{AxialFrame, to_shape_hit, unrounded_t};
-use super::surface_packet::{SurfaceF64, SurfacePointF64};
+use super::surface_packet::{SurfacePointF64, SurfacePointsInF64};
 use super::{Aabb, RayF64, ShapeHit, SurfacePoint, SurfaceSample};
 use crate::math::{DVec2, DVec3, Vec2};
 use crate::sampling::warp;
@@ -22,7 +22,7 @@ pub struct Disk {
     radius: f64,
 }
 
-impl SurfaceF64 for Disk {
+impl SurfacePointsInF64 for Disk {
     fn surface_point_f64(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
         self.closest_point_f64(ray.at(unrounded_t(hit, self.intersect_f64(ray))), self.coordinate_bound())
     }
@@ -135,15 +135,15 @@ impl Disk {
     }
 
     /// Local geometry of the disk near a point, for density estimation.
-    pub fn local_geometry_near(&self, point: DVec3) -> LocalGeometry {
+    pub fn polygons_or_surface_near(&self, point: DVec3) -> NearbyGeometry {
         let (normal, from) = (self.normal(), point - self.centroid());
         let extent = FlatOrRoundExtent::Flat(self.radius - from.length());
         let ground = NearestSurface { normal, height: from.dot(normal).abs(), extent };
-        LocalGeometry::Surface { distance: self.distance_from_point(point), ground: Some(ground) }
+        NearbyGeometry::Surface { distance: self.distance_from_point(point), ground: Some(ground) }
     }
 
     /// Whether a point is inside. Always false because a disk has no volume.
-    pub fn encloses(&self, _: DVec3) -> bool {
+    pub fn volume_contains(&self, _: DVec3) -> bool {
         false
     }
 

@@ -10,8 +10,8 @@ pub type FlatPolygon = ArrayVec<DVec3, 4>;
 
 /// Shape geometry near a point, for integrating a density-estimation kernel.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum LocalGeometry {
-    /// Number of flat polygons that form the shape. See [`Shape::polygon_face`](super::Shape::polygon_face).
+pub enum NearbyGeometry {
+    /// Number of flat polygons that form the shape. See [`Shape::polygon_face_at`](super::Shape::polygon_face_at).
     Polygons(u32),
     /// A non-polygonal surface.
     Surface {
@@ -44,11 +44,11 @@ pub enum FlatOrRoundExtent {
 
 /// Returns the parallelogram with corner c and edges u and v.
 #[inline]
-pub(super) fn parallelogram_polygon((c, u, v): (DVec3, DVec3, DVec3)) -> FlatPolygon {
+pub(super) fn polygon_from_parallelogram((c, u, v): (DVec3, DVec3, DVec3)) -> FlatPolygon {
     FlatPolygon::from([c, c + u, c + u + v, c + v])
 }
 
-impl LocalGeometry {
+impl NearbyGeometry {
     /// Describes a curved surface of which only the distance is known.
     pub(super) fn from_distance_to_curved_surface(distance: f64) -> Self {
         Self::Surface { distance, ground: None }

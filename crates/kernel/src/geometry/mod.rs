@@ -26,7 +26,7 @@ pub mod watertight;
 pub mod watertight_packet;
 
 pub use aabb::Aabb;
-pub use local_geometry::LocalGeometry;
+pub use local_geometry::NearbyGeometry;
 pub use ray::{Ray, RayF64};
 pub use surface::{ShapeHit, SurfacePoint, SurfaceRequest, SurfaceSample};
 
@@ -36,12 +36,12 @@ use cone::Cone;
 use cuboid::OrientedBox;
 use cylinder::Cylinder;
 use disk::Disk;
-use local_geometry::{FlatPolygon, parallelogram_polygon};
+use local_geometry::{FlatPolygon, polygon_from_parallelogram};
 use packet::{F32x16, HitPacket, RayPacket};
 use parallelogram::Parallelogram;
 use plane::Plane;
 use sphere::Sphere;
-use surface_packet::{SurfaceF64 as _, SurfacePacket, SurfacePointF64};
+use surface_packet::{SurfacePacket, SurfacePointF64, SurfacePointsInF64 as _};
 use torus::Torus;
 use transformed::TransformedShape;
 use triangle::Triangle;
@@ -259,7 +259,7 @@ impl Shape {
 
     /// Whether a point is inside.
     pub fn encloses_point(&self, point: DVec3) -> bool {
-        for_shape!(self, it => it.encloses(point))
+        for_shape!(self, it => it.volume_contains(point))
     }
 
     /// Whether the shape encloses a volume. A plane encloses the half-space behind it.
@@ -297,9 +297,9 @@ impl Shape {
             | Self::Cone(_)
             | Self::Quad(_)
             | Self::Triangle(_)
-            | Self::Disk(_) => {
-                self.is_closed().then(|| for_shape!(self, it => points.map(|point| it.encloses(point))))
-            }
+            | Self::Disk(_) => self
+                .is_closed()
+                .then(|| for_shape!(self, it => points.map(|point| it.volume_contains(point)))),
         }
     }
 
@@ -346,43 +346,45 @@ impl Shape {
 
     /// Local geometry of the shape near a point, for density estimation.
     #[inline]
-    pub fn local_geometry_near(&self, point: DVec3) -> LocalGeometry {
+    pub fn polygons_or_surface_near(&self, point: DVec3) -> NearbyGeometry {
         match self {
-            Self::Quad(_) | Self::Triangle(_) => LocalGeometry::Polygons(1),
-            Self::Box(_) => LocalGeometry::Polygons(6),
-            Self::Sphere(sphere) => sphere.local_geometry_near(point),
-            Self::Plane(plane) => plane.local_geometry_near(point),
-            Self::Disk(disk) => disk.local_geometry_near(point),
+            Self::Quad(_) | Self::Triangle(_) => NearbyGeometry::Polygons(1),
+            Self::Box(_) => NearbyGeometry::Polygons(6),
+            Self::Sphere(sphere) => sphere.polygons_or_surface_near(point),
+            Self::Plane(plane) => plane.polygons_or_surface_near(point),
+            Self::Disk(disk) => disk.polygons_or_surface_near(point),
             Self::Cylinder(cylinder) => {
-                LocalGeometry::from_distance_to_curved_surface(cylinder.distance_from_point(point))
+                NearbyGeometry::from_distance_to_curved_surface(cylinder.distance_from_point(point))
             }
             Self::Cone(cone) => {
-                LocalGeometry::from_distance_to_curved_surface(cone.distance_from_point(point))
+                NearbyGeometry::from_distance_to_curved_surface(cone.distance_from_point(point))
             }
             Self::Torus(torus) => {
-                LocalGeometry::from_distance_to_curved_surface(torus.distance_from_point(point))
+                NearbyGeometry::from_distance_to_curved_surface(torus.distance_from_point(point))
             }
-            Self::Transformed(transformed) => transformed.local_geometry_near(point),
+            Self::Transformed(transformed) => transformed.polygons_or_surface_near(point),
         }
     }
 
     /// Returns the flat polygon with the given index, or `None` if the index is out of range or the shape is
     /// not made of flat polygons.
     #[inline]
-    pub fn polygon_face(&self, number: u32) -> Option<FlatPolygon> {
+    pub fn polygon_face_at(&self, number: u32) -> Option<FlatPolygon> {
         match self {
-            Self::Quad(quad) => (number < 1).then(|| parallelogram_polygon((quad.corner, quad.u, quad.v))),
+            Self::Quad(quad) => {
+                (number < 1).then(|| polygon_from_parallelogram((quad.corner, quad.u, quad.v)))
+            }
             Self::Triangle(triangle) => {
                 (number < 1).then(|| [triangle.a, triangle.b, triangle.c].into_iter().collect())
             }
-            Self::Box(cuboid) => (number < 6).then(|| parallelogram_polygon(cuboid.face(number))),
+            Self::Box(cuboid) => (number < 6).then(|| polygon_from_parallelogram(cuboid.face(number))),
             Self::Sphere(_)
             | Self::Plane(_)
             | Self::Disk(_)
             | Self::Cylinder(_)
             | Self::Cone(_)
             | Self::Torus(_) => None,
-            Self::Transformed(transformed) => transformed.polygon_face(number),
+            Self::Transformed(transformed) => transformed.polygon_face_at(number),
         }
     }
 

@@ -3,7 +3,7 @@
 use super::packet::{
     F32x16, HitPacket, PACKET_SIZE, RayPacket, can_quotient_be_in_range, round_t_to_f32_or_nan,
 };
-use super::surface_packet::{SurfaceF64, SurfacePointF64, UvMapped};
+use super::surface_packet::{SurfacePointF64, SurfacePointsInF64, UvMapped};
 use super::{Aabb, RayF64, ShapeHit, SurfacePoint, SurfaceSample};
 use crate::math::lanes::{Simd, TRUE};
 use crate::math::{DVec2, DVec3, Vec2};
@@ -130,7 +130,7 @@ impl Parallelogram {
     }
 
     /// Whether a point is inside. Always false because a quad has no volume.
-    pub fn encloses(&self, _: DVec3) -> bool {
+    pub fn volume_contains(&self, _: DVec3) -> bool {
         false
     }
 
@@ -141,7 +141,7 @@ impl Parallelogram {
     }
 }
 
-impl SurfaceF64 for Parallelogram {
+impl SurfacePointsInF64 for Parallelogram {
     #[inline(always)]
     fn surface_point_f64(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
         let [s, t] = self.hit_coordinates(ray, hit);

@@ -1,11 +1,11 @@
 //! Infinite planes in double precision.
 
-use super::local_geometry::{FlatOrRoundExtent, LocalGeometry, NearestSurface};
+use super::local_geometry::{FlatOrRoundExtent, NearbyGeometry, NearestSurface};
 use super::packet::{
     F32x16, HitPacket, PACKET_SIZE, RayPacket, can_quotient_be_in_range, round_t_to_f32_or_nan,
 };
 use super::surface::tangents_from_normal;
-use super::surface_packet::{SurfaceF64, SurfacePointF64, UvMapped};
+use super::surface_packet::{SurfacePointF64, SurfacePointsInF64, UvMapped};
 use super::{RayF64, ShapeHit, SurfacePoint, SurfaceSample};
 use crate::math::lanes::{Simd, TRUE};
 use crate::math::{DVec2, DVec3, Vec2};
@@ -106,18 +106,18 @@ impl Plane {
     }
 
     /// Local geometry of the plane near a point, for density estimation.
-    pub fn local_geometry_near(&self, point: DVec3) -> LocalGeometry {
+    pub fn polygons_or_surface_near(&self, point: DVec3) -> NearbyGeometry {
         let distance = self.unsigned_distance(point);
         let ground = NearestSurface {
             normal: self.normal,
             height: distance,
             extent: FlatOrRoundExtent::Flat(f64::INFINITY),
         };
-        LocalGeometry::Surface { distance, ground: Some(ground) }
+        NearbyGeometry::Surface { distance, ground: Some(ground) }
     }
 
     /// Whether a point is inside. Unlike [`Plane::is_behind`], this is always false.
-    pub fn encloses(&self, _: DVec3) -> bool {
+    pub fn volume_contains(&self, _: DVec3) -> bool {
         false
     }
 
@@ -132,7 +132,7 @@ impl Plane {
     }
 }
 
-impl SurfaceF64 for Plane {
+impl SurfacePointsInF64 for Plane {
     #[inline(always)]
     fn surface_point_f64(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
         let [s, t] = self.hit_coordinates(ray, hit);

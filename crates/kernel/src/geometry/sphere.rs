@@ -2,9 +2,9 @@
 
 use std::f64::consts::PI;
 
-use super::local_geometry::{FlatOrRoundExtent, LocalGeometry, NearestSurface};
+use super::local_geometry::{FlatOrRoundExtent, NearbyGeometry, NearestSurface};
 use super::packet::{F32x16, HitPacket, PACKET_SIZE, RayPacket, round_t_to_f32_or_nan};
-use super::surface_packet::{SurfaceF64, SurfacePointF64};
+use super::surface_packet::{SurfacePointF64, SurfacePointsInF64};
 use super::{Aabb, RayF64, ShapeHit, SurfacePoint, SurfaceSample};
 use crate::math::lanes::{Simd, TRUE};
 use crate::math::{DVec2, DVec3, Vec2};
@@ -118,15 +118,15 @@ impl Sphere {
     }
 
     /// Local geometry of the sphere near a point, for density estimation.
-    pub fn local_geometry_near(&self, point: DVec3) -> LocalGeometry {
+    pub fn polygons_or_surface_near(&self, point: DVec3) -> NearbyGeometry {
         let (distance, out) = (self.distance_from_point(point), (point - self.center).normalize_or_zero());
         let ground =
             NearestSurface { normal: out, height: distance, extent: FlatOrRoundExtent::Round(self.radius) };
-        LocalGeometry::Surface { distance, ground: Some(ground) }
+        NearbyGeometry::Surface { distance, ground: Some(ground) }
     }
 
     /// Whether a point is inside.
-    pub fn encloses(&self, point: DVec3) -> bool {
+    pub fn volume_contains(&self, point: DVec3) -> bool {
         let (distance, radius) = ((point - self.center).length_squared(), self.radius * self.radius);
         // The slow square root is only needed if rounding errors could change the result.
         if (distance - radius).abs() > radius * (16.0 * f64::EPSILON) {
@@ -141,7 +141,7 @@ impl Sphere {
     }
 }
 
-impl SurfaceF64 for Sphere {
+impl SurfacePointsInF64 for Sphere {
     #[inline(always)]
     fn surface_point_f64(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
         let outwards = ray.at(f64::from(hit.t)) - self.center;

@@ -285,8 +285,8 @@ pub(super) mod tests {
         }
     }
 
-    /// A thin shape around the z axis from −1 to 1, used by [`hits_from_afar`].
-    pub trait ThinShape {
+    /// A thin shape around the z axis from −1 to 1, used by [`check_hits_from_afar`].
+    pub trait SlenderShape {
         /// Creates a thin shape with the given radius.
         fn thin(radius: f64, capped: bool) -> Self;
 
@@ -301,7 +301,7 @@ pub(super) mod tests {
     }
 
     /// Checks hit points of rays so distant that both crossings of the side round to the same distance.
-    pub fn hits_from_afar<T: ThinShape + std::fmt::Debug>() {
+    pub fn check_hits_from_afar<T: SlenderShape + std::fmt::Debug>() {
         let mut ambiguous = 0;
         for (i, capped) in (0..4000_u32).flat_map(|i| [(i, true), (i, false)]) {
             let thin = T::thin(0.01, capped);

@@ -44,7 +44,7 @@ impl SurfacePointF64 {
 }
 
 /// A shape that computes surface points in double precision.
-pub trait SurfaceF64 {
+pub trait SurfacePointsInF64 {
     /// Surface point at a hit.
     fn surface_point_f64(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64;
 }
@@ -120,7 +120,7 @@ impl SurfacePacket {
     #[inline(always)]
     pub(super) fn fill_point_lanes_with_simd(
         &mut self,
-        shape: &impl SurfaceF64,
+        shape: &impl SurfacePointsInF64,
         rays: &RayPacket,
         hits: &HitPacket,
         of: u32,

@@ -135,9 +135,9 @@ fn centroid_is_the_mean_of_the_points() {
 
 #[test]
 fn distance_is_to_the_nearest_point() {
-    let distance = |shape: &Shape, point: DVec3| match shape.local_geometry_near(point) {
-        LocalGeometry::Surface { distance, .. } => Some(distance),
-        LocalGeometry::Polygons(_) => None,
+    let distance = |shape: &Shape, point: DVec3| match shape.polygons_or_surface_near(point) {
+        NearbyGeometry::Surface { distance, .. } => Some(distance),
+        NearbyGeometry::Polygons(_) => None,
     };
     for shape in shapes() {
         let parts = (0_u32..).zip(shape.local_part_areas()).filter(|(_, area)| *area > 0.0);

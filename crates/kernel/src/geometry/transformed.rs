@@ -3,8 +3,8 @@
 //! Rays are transformed to the shape's own coordinates in double precision. An affine transform preserves the
 //! ray parameter t, so hits are the same in both coordinate systems.
 
-use super::local_geometry::{FlatOrRoundExtent, FlatPolygon, LocalGeometry, NearestSurface};
-use super::surface_packet::{SurfaceF64, SurfacePointF64};
+use super::local_geometry::{FlatOrRoundExtent, FlatPolygon, NearbyGeometry, NearestSurface};
+use super::surface_packet::{SurfacePointF64, SurfacePointsInF64};
 use super::{Aabb, RayF64, Shape, ShapeHit, SurfacePoint, SurfaceSample};
 use crate::math::transform::Transform;
 use crate::math::{DVec2, DVec3, Vec2};
@@ -121,7 +121,7 @@ impl TransformedShape {
     }
 
     /// Whether a point is inside.
-    pub fn encloses(&self, point: DVec3) -> bool {
+    pub fn volume_contains(&self, point: DVec3) -> bool {
         self.shape.encloses_point(self.to_world.inverse_point(point))
     }
 
@@ -157,7 +157,7 @@ impl TransformedShape {
     }
 
     /// Local geometry of the shape near a point, for density estimation. The distance is a lower bound.
-    pub fn local_geometry_near(&self, point: DVec3) -> LocalGeometry {
+    pub fn polygons_or_surface_near(&self, point: DVec3) -> NearbyGeometry {
         let ground_to_world = |ground: NearestSurface| match ground.extent {
             FlatOrRoundExtent::Flat(extent) => {
                 let normal = self.to_world.normal(ground.normal);
@@ -170,19 +170,19 @@ impl TransformedShape {
             }
             FlatOrRoundExtent::Round(_) => None,
         };
-        match self.shape.local_geometry_near(self.to_world.inverse_point(point)) {
-            LocalGeometry::Polygons(count) => LocalGeometry::Polygons(count),
-            LocalGeometry::Surface { distance, ground } => LocalGeometry::Surface {
+        match self.shape.polygons_or_surface_near(self.to_world.inverse_point(point)) {
+            NearbyGeometry::Polygons(count) => NearbyGeometry::Polygons(count),
+            NearbyGeometry::Surface { distance, ground } => NearbyGeometry::Surface {
                 distance: distance / self.inverse_stretch,
                 ground: ground.and_then(ground_to_world),
             },
         }
     }
 
-    /// [`Shape::polygon_face`] in world coordinates.
-    pub fn polygon_face(&self, number: u32) -> Option<FlatPolygon> {
+    /// [`Shape::polygon_face_at`] in world coordinates.
+    pub fn polygon_face_at(&self, number: u32) -> Option<FlatPolygon> {
         let mut corners: FlatPolygon =
-            self.shape.polygon_face(number)?.iter().map(|corner| self.to_world.point(*corner)).collect();
+            self.shape.polygon_face_at(number)?.iter().map(|corner| self.to_world.point(*corner)).collect();
         if self.to_world.flips_handedness() {
             corners.reverse();
         }
@@ -203,7 +203,7 @@ impl TransformedShape {
     }
 }
 
-impl SurfaceF64 for TransformedShape {
+impl SurfacePointsInF64 for TransformedShape {
     fn surface_point_f64(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
         let SurfacePointF64 { point, normal, reach } =
             self.shape.surface_point_f64(&self.ray_to_local(ray), hit);

@@ -1,7 +1,7 @@
 //! Single triangles in double precision.
 
 use super::packet::{F32x16, HitPacket, RayPacket, round_t_to_f32_or_nan};
-use super::surface_packet::{SurfaceF64, SurfacePointF64};
+use super::surface_packet::{SurfacePointF64, SurfacePointsInF64};
 use super::{Aabb, RayF64, ShapeHit, SurfacePoint, SurfaceSample};
 use crate::math::{DVec2, DVec3, Vec2};
 use crate::sampling::warp;
@@ -106,7 +106,7 @@ impl Triangle {
     }
 
     /// Whether a point is inside, which is never the case because a triangle has no volume.
-    pub fn encloses(&self, _: DVec3) -> bool {
+    pub fn volume_contains(&self, _: DVec3) -> bool {
         false
     }
 
@@ -125,7 +125,7 @@ pub fn barycentric_weights_at_point([a, b, c]: [DVec3; 3], point: DVec3) -> DVec
     DVec2::new(of(ap.cross(ac)), of(ab.cross(ap)))
 }
 
-impl SurfaceF64 for Triangle {
+impl SurfacePointsInF64 for Triangle {
     #[inline(always)]
     fn surface_point_f64(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
         let (u, v) = (f64::from(hit.u), f64::from(hit.v));

@@ -212,7 +212,7 @@ impl TriangleList {
         except: &[u32; PACKET_SIZE],
         simd: impl Simd,
     ) -> NearestCandidates {
-        let ErrorTerms { plane, far, across, length, end } = self.error_terms(rays);
+        let ErrorTerms { plane, far, across, length, end } = self.error_terms_for_rays(rays);
         let mut found = NearestCandidates {
             near: [f32::INFINITY; PACKET_SIZE],
             number: [0; PACKET_SIZE],
@@ -324,7 +324,7 @@ impl TriangleList {
 
     /// Computes the error terms for the rays.
     #[inline(always)]
-    fn error_terms(&self, rays: &RayPacket) -> ErrorTerms {
+    fn error_terms_for_rays(&self, rays: &RayPacket) -> ErrorTerms {
         let none = [0.0; PACKET_SIZE];
         let mut errors = ErrorTerms { plane: none, far: none, across: none, length: none, end: none };
         for i in 0..PACKET_SIZE {

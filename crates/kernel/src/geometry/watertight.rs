@@ -110,9 +110,9 @@ impl ShearedRay {
             ((wa * a.z + wb * b.z + wc * c.z) / sum, wb / sum, wc / sum)
         } else {
             let edges = [
-                segment_point_nearest_to_ray(a, b),
-                segment_point_nearest_to_ray(b, c),
-                segment_point_nearest_to_ray(c, a),
+                ray_segment_closest_approach(a, b),
+                ray_segment_closest_approach(b, c),
+                ray_segment_closest_approach(c, a),
             ];
             let edge = (0..3).min_by(|&i, &j| edges[i].0.total_cmp(&edges[j].0)).unwrap_or(0);
             let (_, part, t) = edges[edge];
@@ -183,7 +183,7 @@ fn max_or_second_if_nan(a: f32, b: f32) -> f32 {
 /// Finds the point on the segment from p to q that is nearest to the ray. z coordinates are distances along
 /// the ray. Returns the squared distance from the ray, the position on the segment as a fraction, and the
 /// distance along the ray.
-fn segment_point_nearest_to_ray(p: DVec3, q: DVec3) -> (f64, f64, f64) {
+fn ray_segment_closest_approach(p: DVec3, q: DVec3) -> (f64, f64, f64) {
     let (start, way) = (p.truncate(), (q - p).truncate());
     let part = (-start.dot(way) / way.length_squared()).clamp(0.0, 1.0);
     let part = if part.is_nan() { 0.0 } else { part };

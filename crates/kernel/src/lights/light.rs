@@ -4,7 +4,7 @@ use super::area::{AreaLight, EmissionModulation};
 use super::delta::{DeltaLight, PointLight, SpotLight};
 use super::infinite::{DirectionalLight, Environment, InfiniteLight};
 use super::packet::LightSamplePacket;
-use super::sample::{LightCenter, LightHitPoint, LightSample, LightSceneGeometry};
+use super::sample::{GeometryOfLight, LightCenter, LightHitPoint, LightSample};
 use super::tree::LightBounds;
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane};
@@ -165,17 +165,17 @@ impl Light {
 
     /// The light's center and the light's own geometry, which rays toward the center must ignore. Returns
     /// `None` for an environment.
-    pub fn center_and_geometry(&self) -> Option<(LightCenter, LightSceneGeometry)> {
+    pub fn center_and_geometry(&self) -> Option<(LightCenter, GeometryOfLight)> {
         Some(match self.family() {
             LightFamily::Delta(light) => (
                 LightCenter::At(light.isotropic_at_peak_intensity().position.as_vec3()),
-                LightSceneGeometry::Nothing,
+                GeometryOfLight::Nothing,
             ),
             LightFamily::Infinite(light) => {
-                (LightCenter::Towards(light.direction_to_center()?), LightSceneGeometry::Nothing)
+                (LightCenter::Towards(light.direction_to_center()?), GeometryOfLight::Nothing)
             }
             LightFamily::Area(light) => {
-                (LightCenter::At(light.area_centroid().as_vec3()), light.scene_geometry())
+                (LightCenter::At(light.area_centroid().as_vec3()), light.scene_geometry_id())
             }
         })
     }

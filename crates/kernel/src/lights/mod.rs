@@ -46,14 +46,14 @@ pub mod tree;
 
 pub use area::{
     AreaLight, BlendPartWeight, EmissionModulation, EmissionTerm, Emitter, EmittingPart, MeshEmitter, Side,
-    TriangleWithUvs, UvMapping, back_area_light, front_area_light, see_through_shape_side_light,
+    TriangleWithUvs, UvMapping, back_area_light, create_see_through_side_light, front_area_light,
 };
 pub use light::{Light, LightFamily};
-pub use packet::{LightSamplePacket, LightSceneGeometryPacket};
+pub use packet::{EmitterObjectPacket, LightSamplePacket};
 pub use photon_emission::{
     BoundingSphere, EmissiveObjectGeometry, EmittedPhoton, PhotonEmitter, PhotonOrigin, PhotonRandomNumbers,
 };
-pub use sample::{LightCenter, LightHitPoint, LightSample, LightSceneGeometry, ShadowRayEnd};
+pub use sample::{GeometryOfLight, LightCenter, LightHitPoint, LightSample, ShadowRayEnd};
 pub use set::{ExpectedSamplesPerLight, LightSampler, LightSamplingEffort, LightSamplingPurpose, Lights};
 pub use tree::{
     AdaptiveLightTreeCut, LightBounds, LightPick, LightTree, Receiver, ReceiverLobe, ReceiverPacket,

@@ -1,6 +1,6 @@
 //! Samples one light for a packet of points.
 
-use super::sample::{LightSample, LightSceneGeometry, ShadowRayEnd};
+use super::sample::{GeometryOfLight, LightSample, ShadowRayEnd};
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, mask_from_bits, select, select_u32, set_lane};
 
@@ -15,35 +15,35 @@ pub struct LightSamplePacket {
     /// [`LightSample::weight`], or 0 for black samples.
     pub weights: Vec3x16,
     /// Geometry that the shadow rays ignore.
-    pub sources: LightSceneGeometryPacket,
+    pub sources: EmitterObjectPacket,
     /// Mask of samples at infinity.
     pub beyond: u32,
     /// Inverse pdfs in sr, set only for environments. For other lights, they are computed on request.
     pub(super) environment_inverse_pdfs: F32x16,
 }
 
-/// A packet of [`LightSceneGeometry`]s.
+/// A packet of [`GeometryOfLight`]s.
 #[derive(Clone, Debug)]
 #[repr(align(64))]
-pub struct LightSceneGeometryPacket {
-    /// Object index, or [`LightSceneGeometryPacket::NONE`] if there is no geometry.
+pub struct EmitterObjectPacket {
+    /// Object index, or [`EmitterObjectPacket::NONE`] if there is no geometry.
     pub object: [u32; PACKET_SIZE],
-    /// Primitive index, or [`LightSceneGeometryPacket::NONE`] for the entire object.
+    /// Primitive index, or [`EmitterObjectPacket::NONE`] for the entire object.
     pub part: [u32; PACKET_SIZE],
     /// Whether any lane has an object.
     pub is_any: bool,
 }
 
-impl LightSceneGeometryPacket {
+impl EmitterObjectPacket {
     /// Marks a lane that has no object, or a lane that refers to an entire object.
     pub const NONE: u32 = u32::MAX;
 
-    /// Marks a [`LightSceneGeometry::SeeThrough`] lane. No primitive has this index.
+    /// Marks a [`GeometryOfLight::SeeThrough`] lane. No primitive has this index.
     const SEE_THROUGH: u32 = u32::MAX - 1;
 
     /// A packet with the same source in all lanes.
     #[inline(always)]
-    pub fn splat(source: LightSceneGeometry) -> Self {
+    pub fn splat(source: GeometryOfLight) -> Self {
         let (object, part) = object_and_part_codes(source);
         Self { object: [object; PACKET_SIZE], part: [part; PACKET_SIZE], is_any: object != Self::NONE }
     }
@@ -57,30 +57,30 @@ impl LightSceneGeometryPacket {
 
     /// Returns a lane's light source geometry.
     #[inline]
-    pub fn geometry(&self, lane: usize) -> LightSceneGeometry {
+    pub fn geometry(&self, lane: usize) -> GeometryOfLight {
         match (self.object[lane], self.part[lane]) {
-            (Self::NONE, _) => LightSceneGeometry::Nothing,
-            (object, Self::NONE) => LightSceneGeometry::Object(object),
-            (object, Self::SEE_THROUGH) => LightSceneGeometry::SeeThrough(object),
-            (object, part) => LightSceneGeometry::Primitive(object, part),
+            (Self::NONE, _) => GeometryOfLight::Nothing,
+            (object, Self::NONE) => GeometryOfLight::Object(object),
+            (object, Self::SEE_THROUGH) => GeometryOfLight::SeeThrough(object),
+            (object, part) => GeometryOfLight::Primitive(object, part),
         }
     }
 
     /// Sets a lane's light source geometry.
     #[inline(always)]
-    pub fn set_geometry(&mut self, lane: usize, source: LightSceneGeometry) {
+    pub fn set_geometry(&mut self, lane: usize, source: GeometryOfLight) {
         (self.object[lane], self.part[lane]) = object_and_part_codes(source);
         self.is_any |= self.object[lane] != Self::NONE;
     }
 }
 
 #[inline(always)]
-fn object_and_part_codes(source: LightSceneGeometry) -> (u32, u32) {
+fn object_and_part_codes(source: GeometryOfLight) -> (u32, u32) {
     match source {
-        LightSceneGeometry::Nothing => (LightSceneGeometryPacket::NONE, LightSceneGeometryPacket::NONE),
-        LightSceneGeometry::Object(object) => (object, LightSceneGeometryPacket::NONE),
-        LightSceneGeometry::SeeThrough(object) => (object, LightSceneGeometryPacket::SEE_THROUGH),
-        LightSceneGeometry::Primitive(object, part) => (object, part),
+        GeometryOfLight::Nothing => (EmitterObjectPacket::NONE, EmitterObjectPacket::NONE),
+        GeometryOfLight::Object(object) => (object, EmitterObjectPacket::NONE),
+        GeometryOfLight::SeeThrough(object) => (object, EmitterObjectPacket::SEE_THROUGH),
+        GeometryOfLight::Primitive(object, part) => (object, part),
     }
 }
 
@@ -105,7 +105,7 @@ pub(super) use packet_of;
 /// [`packet_of`] for lights at infinity.
 macro_rules! infinite_packet_of {
     ($i:ident => $sample:expr) => {{
-        let row = $crate::lights::packet::packet_of!($crate::lights::sample::LightSceneGeometry::Nothing, $i => {
+        let row = $crate::lights::packet::packet_of!($crate::lights::sample::GeometryOfLight::Nothing, $i => {
             let (direction, weight) = $sample;
             (direction, $crate::math::Vec3::ZERO, weight)
         });
@@ -132,12 +132,12 @@ impl LightSamplePacket {
     }
 
     #[inline(always)]
-    pub(super) fn black(source: LightSceneGeometry) -> Self {
+    pub(super) fn black(source: GeometryOfLight) -> Self {
         Self {
             directions: [[0.0; PACKET_SIZE]; 3],
             targets: [[0.0; PACKET_SIZE]; 3],
             weights: [[0.0; PACKET_SIZE]; 3],
-            sources: LightSceneGeometryPacket::splat(source),
+            sources: EmitterObjectPacket::splat(source),
             beyond: 0,
             environment_inverse_pdfs: [0.0; PACKET_SIZE],
         }
@@ -159,7 +159,7 @@ impl LightSamplePacket {
         used: u32,
         sample: impl Fn(usize, Vec3) -> Option<LightSample>,
     ) -> Self {
-        let mut row = Self::black(LightSceneGeometry::Nothing);
+        let mut row = Self::black(GeometryOfLight::Nothing);
         for i in (0..PACKET_SIZE).filter(|i| used & 1 << i != 0) {
             if let Some(sample) = sample(i, lane(points, i)) {
                 row.set_sample(i, &sample);

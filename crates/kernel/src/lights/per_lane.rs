@@ -7,7 +7,7 @@ use super::area::sphere::SphereEmitter;
 use super::area::{AreaLight, SampledLightPoint, ShapeEmitter};
 use super::delta::DeltaLight;
 use super::packet::{LightSamplePacket, packet_of};
-use super::sample::LightSceneGeometry;
+use super::sample::GeometryOfLight;
 use super::{Light, Lights};
 use crate::geometry::packet::set_bit_lanes;
 use crate::math::Vec3;
@@ -16,14 +16,14 @@ use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, set_lane};
 /// Samples convex emitters for a packet in which each lane has its own emitter.
 macro_rules! convex_packet_of {
     ($i:ident => $all:expr, $points:expr, $u:expr) => {{
-        let mut row = packet_of!(LightSceneGeometry::Nothing, $i => {
+        let mut row = packet_of!(GeometryOfLight::Nothing, $i => {
             let (emitter, light) = $all[$i];
             let SampledLightPoint { direction, target, factor } =
                 emitter.sample(lane($points, $i), [$u[0][$i], $u[1][$i]]);
             (direction, target, light.radiance * factor)
         });
         for $i in 0..PACKET_SIZE {
-            row.sources.set_geometry($i, LightSceneGeometry::Object($all[$i].1.object));
+            row.sources.set_geometry($i, GeometryOfLight::Object($all[$i].1.object));
         }
         row
     }};
@@ -45,7 +45,7 @@ impl Lights {
         for i in 1..PACKET_SIZE {
             lights[i] = self.get(picked[i]);
         }
-        let mut row = LightSamplePacket::black(LightSceneGeometry::Nothing);
+        let mut row = LightSamplePacket::black(GeometryOfLight::Nothing);
         let mut left = used;
         // Sample all lights of the same kind together. Other lanes get a copy of one of these lights, but
         // their results are discarded.
@@ -54,21 +54,20 @@ impl Lights {
             let mut of = 0;
             let found = if let Some(filler) = lights[first].as_point() {
                 let lights = lights_of_kind_or_filler((&lights, left), &mut of, Light::as_point, filler);
-                packet_of!(LightSceneGeometry::Nothing, i => {
+                packet_of!(GeometryOfLight::Nothing, i => {
                     let (direction, weight) = lights[i].direction_and_irradiance(lane(points, i));
                     (direction, lights[i].position.as_vec3(), weight)
                 })
-            } else if let Some(filler) = sphere_emitter_and_light(lights[first]) {
-                let balls =
-                    lights_of_kind_or_filler((&lights, left), &mut of, sphere_emitter_and_light, filler);
+            } else if let Some(filler) = as_sphere_and_light(lights[first]) {
+                let balls = lights_of_kind_or_filler((&lights, left), &mut of, as_sphere_and_light, filler);
                 convex_packet_of!(i => balls, points, u)
-            } else if let Some(filler) = quad_emitter_and_light(lights[first]) {
-                let quads =
-                    lights_of_kind_or_filler((&lights, left), &mut of, quad_emitter_and_light, filler);
+            } else if let Some(filler) = as_quad_and_light(lights[first]) {
+                let quads = lights_of_kind_or_filler((&lights, left), &mut of, as_quad_and_light, filler);
                 let mut row = convex_packet_of!(i => quads, points, u);
                 for i in 0..PACKET_SIZE {
                     if let Some((_, Some(two))) = quads[i].1.shape.as_quad() {
-                        row.sources.part[i] = two.primitive_at(lane(points, i), lane(&row.targets, i));
+                        row.sources.part[i] =
+                            two.primitive_containing(lane(points, i), lane(&row.targets, i));
                     }
                 }
                 row
@@ -111,13 +110,13 @@ impl Lights {
 }
 
 #[inline(always)]
-fn sphere_emitter_and_light(light: &Light) -> Option<(&SphereEmitter, &AreaLight)> {
+fn as_sphere_and_light(light: &Light) -> Option<(&SphereEmitter, &AreaLight)> {
     let light = light.as_area()?;
     light.shape.as_sphere().map(|sphere| (sphere, light))
 }
 
 #[inline(always)]
-fn quad_emitter_and_light(light: &Light) -> Option<(&QuadEmitter, &AreaLight)> {
+fn as_quad_and_light(light: &Light) -> Option<(&QuadEmitter, &AreaLight)> {
     let light = light.as_area()?;
     light.shape.as_quad().map(|(quad, _)| (quad, light))
 }

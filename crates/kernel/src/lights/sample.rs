@@ -13,7 +13,7 @@ pub struct LightSample {
     /// incidence. The contribution is the weight times the BSDF and the cosine.
     pub weight: Vec3,
     /// The light's own geometry, which the shadow ray ignores.
-    pub source: LightSceneGeometry,
+    pub source: GeometryOfLight,
 }
 
 /// End of a shadow ray.
@@ -36,7 +36,7 @@ pub enum LightCenter {
 
 /// The scene geometry that belongs to a light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LightSceneGeometry {
+pub enum GeometryOfLight {
     /// No geometry.
     Nothing,
     /// A convex object. It does not block rays to its near side.

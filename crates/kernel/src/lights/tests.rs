@@ -404,8 +404,7 @@ fn triangle_pairs_are_sampled_like_quads() {
                 (own.direction, own.weight, own.end),
                 (expected.direction, expected.weight, expected.end)
             );
-            let (LightSceneGeometry::Primitive(OBJECT, part), ShadowRayEnd::At(target)) =
-                (own.source, own.end)
+            let (GeometryOfLight::Primitive(OBJECT, part), ShadowRayEnd::At(target)) = (own.source, own.end)
             else {
                 panic!("expected a point on a triangle")
             };
@@ -459,9 +458,7 @@ fn area_samples_are_proportional_to_area() {
     for sample in 0..COUNT {
         let u = PixelSampler::new(3, 1, 4, sample).pair(1, Dimension::ChosenLight);
         let Some(sample) = light.sample(from, Vec3::NEG_Z, [u.x, u.y]) else { panic!("expected a sample") };
-        let LightSceneGeometry::Primitive(OBJECT, part) = sample.source else {
-            panic!("expected a triangle")
-        };
+        let GeometryOfLight::Primitive(OBJECT, part) = sample.source else { panic!("expected a triangle") };
         counts[(part - 5) as usize] += 1;
         flux += f64::from(sample.weight.x * -sample.direction.z) / f64::from(COUNT);
     }

@@ -47,7 +47,7 @@ pub enum LobesToSample {
 /// Values of the shown lobes of a packet of BSDFs, for one light direction per lane.
 #[derive(Clone, Debug)]
 #[repr(align(64))]
-pub struct BsdfValues {
+pub struct BsdfValuePacket {
     /// f of the wide lobes in sr⁻¹.
     pub wide: Vec3x16,
     /// f of the narrow lobes in sr⁻¹.
@@ -58,7 +58,7 @@ pub struct BsdfValues {
     pub(super) shape: F32x16,
 }
 
-impl BsdfValues {
+impl BsdfValuePacket {
     /// No light.
     pub const ZERO: Self = Self {
         wide: [[0.0; PACKET_SIZE]; 3],
@@ -79,7 +79,7 @@ impl BsdfValues {
         f
     }
 
-    /// Fractions of [`BsdfValues::f`] from wide lobes, or 0 where f is 0.
+    /// Fractions of [`BsdfValuePacket::f`] from wide lobes, or 0 where f is 0.
     #[inline(never)]
     pub fn wide_fraction(&self) -> Vec3x16 {
         ratio(&self.wide, &self.f())

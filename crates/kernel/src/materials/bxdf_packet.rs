@@ -2,7 +2,7 @@
 
 mod out_of_line;
 
-use super::bsdf::{BsdfValues, DielectricSamplePacket, LobesToSample, NarrowLobe, ShownLobes};
+use super::bsdf::{BsdfValuePacket, DielectricSamplePacket, LobesToSample, NarrowLobe, ShownLobes};
 use super::bxdf::{Bxdf, BxdfFlags, LobesWithNormal, ShadingGeometry};
 use super::microfacet::tilt_to_face_viewer_branchless;
 use super::rough_dielectric::DielectricBxdf;
@@ -154,8 +154,8 @@ impl<B: Bxdf> BxdfPacket<B> {
 
     /// Evaluates the lobes for light from the directions `wi`.
     #[inline(always)]
-    pub fn f(&self, wi: &Vec3x16) -> BsdfValues {
-        let mut values = BsdfValues::ZERO;
+    pub fn f(&self, wi: &Vec3x16) -> BsdfValuePacket {
+        let mut values = BsdfValuePacket::ZERO;
         if self.any_has_wide_lobe() {
             for i in 0..PACKET_SIZE {
                 let bsdf = B::get(&self.bsdf, i);
@@ -185,7 +185,7 @@ impl<B: Bxdf> BxdfPacket<B> {
 
     /// Adds the narrow lobes to `values`.
     #[inline(always)]
-    fn add_narrow_lobe_values(&self, wi: &Vec3x16, values: &mut BsdfValues, any: BxdfFlags) {
+    fn add_narrow_lobe_values(&self, wi: &Vec3x16, values: &mut BsdfValuePacket, any: BxdfFlags) {
         for i in 0..PACKET_SIZE {
             let bsdf = B::get(&self.bsdf, i);
             let value = bsdf.narrow_lobe_value(&B::View::get(&self.view, i), lane(wi, i), any);
@@ -198,7 +198,13 @@ impl<B: Bxdf> BxdfPacket<B> {
     /// Pdfs in sr⁻¹ of directions sampled from these lobes. Cosine lobes are centered on `normals`. `values`
     /// is the result of [`BxdfPacket::f`].
     #[inline(always)]
-    pub fn pdf(&self, lobes: LobesToSample, normals: &Vec3x16, wi: &Vec3x16, values: &BsdfValues) -> F32x16 {
+    pub fn pdf(
+        &self,
+        lobes: LobesToSample,
+        normals: &Vec3x16,
+        wi: &Vec3x16,
+        values: &BsdfValuePacket,
+    ) -> F32x16 {
         if self.any_has_narrow_lobe() {
             self.pdf_with_const_narrow::<true>(lobes, normals, wi, values)
         } else {
@@ -212,7 +218,7 @@ impl<B: Bxdf> BxdfPacket<B> {
         lobes: LobesToSample,
         normals: &Vec3x16,
         wi: &Vec3x16,
-        values: &BsdfValues,
+        values: &BsdfValuePacket,
     ) -> F32x16 {
         let any = flags_with_const_narrow::<NARROW>(self.any);
         let mut pdfs = [0.0; PACKET_SIZE];

@@ -19,7 +19,7 @@ use super::fresnel::{dielectric_from_outside, schlick_weight};
 use super::lobe_albedo::{LobeAlbedoPolynomial, TERMS, evaluate_albedo_fit};
 use super::lookup::{MaterialTextureCollector, ParameterLookup, PointTextureEvaluator};
 use super::microfacet::{
-    self, MicrofacetDistribution, SmithTerms, UnnormalizedHalfVector, sample_reflected_direction,
+    self, MicrofacetDistribution, SmithDirectionTerms, UnnormalizedHalfVector, sample_reflected_direction,
 };
 use super::scalar::ScalarParameter;
 use super::schlick_albedo::SchlickAlbedoPair;
@@ -32,14 +32,14 @@ use glimt_base::soa;
 /// A clear coat of a material, with textures.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Coat {
-    inputs: CoatInputs,
+    inputs: CoatTexturedParameters,
     /// Albedos, or `None` if the roughness varies.
     albedo: Option<SchlickAlbedoPair>,
 }
 
 /// The parameters of a clear coat.
 #[derive(Clone, Debug, PartialEq)]
-pub struct CoatInputs {
+pub struct CoatTexturedParameters {
     /// Weight c of the coat.
     pub weight: ScalarParameter,
     /// The square root of α.
@@ -69,7 +69,7 @@ pub struct CoatPoint {
 
 impl Coat {
     /// Creates a coat. Returns `None` if its weight is 0.
-    pub fn new(inputs: CoatInputs) -> Option<Self> {
+    pub fn new(inputs: CoatTexturedParameters) -> Option<Self> {
         if inputs.weight.as_untextured() == Some(0.0) {
             return None;
         }
@@ -80,7 +80,7 @@ impl Coat {
     /// Looks up all parameters.
     #[inline]
     pub fn look_up_parameters<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> CoatPoint {
-        let CoatInputs { weight, roughness, ior, tint } = &self.inputs;
+        let CoatTexturedParameters { weight, roughness, ior, tint } = &self.inputs;
         let weight = lookup.number(weight).clamp(0.0, 1.0);
         let roughness = lookup.number(roughness).clamp(0.0, 1.0);
         // A partial coat absorbs in proportion to its weight.
@@ -198,10 +198,10 @@ impl<const EXACT: bool, const BECKMANN: bool> CoatLayer<EXACT, BECKMANN> {
 
     /// Smith terms for the directions to the viewer and to the light.
     #[inline(always)]
-    fn smith_terms(&self, normal: Vec3, wo: Vec3, wi: Vec3) -> (SmithTerms, SmithTerms) {
+    fn smith_terms(&self, normal: Vec3, wo: Vec3, wi: Vec3) -> (SmithDirectionTerms, SmithDirectionTerms) {
         (
-            SmithTerms::isotropic(Self::DISTRIBUTION, normal, wo, self.alpha),
-            SmithTerms::isotropic(Self::DISTRIBUTION, normal, wi, self.alpha),
+            SmithDirectionTerms::isotropic(Self::DISTRIBUTION, normal, wo, self.alpha),
+            SmithDirectionTerms::isotropic(Self::DISTRIBUTION, normal, wi, self.alpha),
         )
     }
 

@@ -165,14 +165,14 @@ impl UnnormalizedHalfVector {
 
 /// The cosine between a direction and the normal, and s(θ) as defined at the top of this file.
 #[derive(Clone, Copy)]
-pub struct SmithTerms {
+pub struct SmithDirectionTerms {
     /// cosθ.
     pub cosine: f32,
     /// s(θ).
     pub slope: f32,
 }
 
-impl SmithTerms {
+impl SmithDirectionTerms {
     /// Computes the isotropic terms for a direction.
     #[inline(always)]
     pub fn isotropic(
@@ -234,9 +234,9 @@ impl SmithTerms {
     }
 }
 
-impl SmithTerms {
-    /// [`SmithTerms::reflection_pdf`], computed from the result of
-    /// [`SmithTerms::torrance_sparrow_without_fresnel`] instead of D. Returns 0 for directions below the
+impl SmithDirectionTerms {
+    /// [`SmithDirectionTerms::reflection_pdf`], computed from the result of
+    /// [`SmithDirectionTerms::torrance_sparrow_without_fresnel`] instead of D. Returns 0 for directions below the
     /// surface.
     #[inline(always)]
     pub fn pdf_from_reflection_term(&self, other: &Self, reflected: f32) -> f32 {

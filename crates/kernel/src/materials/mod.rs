@@ -28,7 +28,7 @@ pub mod thin_dielectric;
 
 pub use blend::Blend;
 pub use bxdfs::*;
-pub use coat::{Coat, CoatInputs};
+pub use coat::{Coat, CoatTexturedParameters};
 pub use dielectric::Dielectric;
 pub use emission::{Emission, EmissionSides};
 pub use footprint::{ExtraCoordinates, Footprint, ObjectPoint, SecondUvPoint, TexturePoint, UvSet};
@@ -85,7 +85,7 @@ impl Material {
 
     /// Whether the surface, or any part of a blend, scatters light only on its front.
     pub fn is_black_from_behind(&self) -> bool {
-        !self.scatters_on_side(false) || self.is_any_part(Self::is_black_from_behind)
+        !self.scatters_on_side(false) || self.any_blend_part_is(Self::is_black_from_behind)
     }
 
     /// Whether any material property depends on texture coordinates or tangents.
@@ -93,7 +93,7 @@ impl Material {
         self.normal_perturbation.is_some()
             || self.bsdf.is_anisotropic()
             || !self.textures().is_empty()
-            || self.is_any_part(Self::needs_uvs_or_tangents)
+            || self.any_blend_part_is(Self::needs_uvs_or_tangents)
     }
 
     /// The parts of a blend, or `None` for other materials.
@@ -116,7 +116,7 @@ impl Material {
     }
 
     /// Whether a property holds for any part of a blend.
-    fn is_any_part(&self, property: impl Fn(&Self) -> bool) -> bool {
+    fn any_blend_part_is(&self, property: impl Fn(&Self) -> bool) -> bool {
         self.as_blend().is_some_and(|blend| blend.parts.iter().any(property))
     }
 
@@ -137,13 +137,13 @@ impl Material {
 
     /// Whether the surface may emit light.
     pub fn is_emissive(&self) -> bool {
-        self.emission.is_emissive() || self.is_any_part(Self::is_emissive)
+        self.emission.is_emissive() || self.any_blend_part_is(Self::is_emissive)
     }
 
     /// Expected radiance emitted from one side, at the given cosine to the normal: the radiance times the
     /// opacity, or for a blend, the weighted mean of this over its parts. Counts texture lookups in
     /// `lookups`.
-    pub fn expected_emission(
+    pub fn expected_emission_at(
         &self,
         at: &TexturePoint,
         is_front: bool,
@@ -152,7 +152,7 @@ impl Material {
     ) -> Vec3 {
         if let Some(blend) = self.as_blend() {
             return blend.mean_over_parts(at, lookups, |part, lookups| {
-                part.expected_emission(at, is_front, cosine, lookups)
+                part.expected_emission_at(at, is_front, cosine, lookups)
             });
         }
         if !self.emission.emits_on_side(is_front) {
@@ -191,7 +191,7 @@ impl Material {
     pub fn has_null_interaction(&self) -> bool {
         self.bsdf.as_thin_dielectric().is_some()
             || self.opacity.is_some()
-            || self.is_any_part(Self::has_null_interaction)
+            || self.any_blend_part_is(Self::has_null_interaction)
     }
 
     /// Fraction of the light that passes undeflected at a point, for an incident angle with the given cosine.

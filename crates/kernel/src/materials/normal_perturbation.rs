@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::footprint::TexturePoint;
 use super::normal_map::NormalMap;
-use super::texture::{HeightSlopes, Texture};
+use super::texture::{HeightGradient, Texture};
 use crate::math::Vec3;
 
 /// A normal map, a bump map, or both.
@@ -74,13 +74,13 @@ impl Bump {
     /// ∇h.
     fn perturb(&self, at: &TexturePoint, normal: Vec3, bent: Vec3, tangents: [Vec3; 2]) -> Vec3 {
         let gradient = match self.texture.slopes(at) {
-            HeightSlopes::AlongUv(slopes) => {
+            HeightGradient::AlongUv(slopes) => {
                 let [dpdu, dpdv] = self.texture.uv_set_tangents(at, tangents);
                 let slopes = slopes * self.scale;
                 let volume = normal.dot(dpdu.cross(dpdv));
                 (dpdv.cross(normal) * slopes.x + normal.cross(dpdu) * slopes.y) / volume
             }
-            HeightSlopes::World(gradient) => (gradient - normal * gradient.dot(normal)) * self.scale,
+            HeightGradient::World(gradient) => (gradient - normal * gradient.dot(normal)) * self.scale,
         };
         (bent - gradient * bent.dot(normal)).try_normalize().unwrap_or(bent)
     }

@@ -19,7 +19,7 @@ impl Opacity {
     #[inline]
     pub fn evaluate(&self, at: &TexturePoint, lookups: &mut u64) -> f32 {
         match &self.value {
-            ScalarParameter::Texture(texture) if self.cutoff > 0.0 && texture.has_footprint_coverage() => {
+            ScalarParameter::Texture(texture) if self.cutoff > 0.0 && texture.has_coverage_above_cutoff() => {
                 *lookups += 1;
                 texture.coverage_above_cutoff(at, self.cutoff)
             }

@@ -15,7 +15,7 @@ use std::sync::Arc;
 pub use image::{ImageTexture, TextureFilter, ValueScaleAndOffset};
 pub use mapping::{TextureMapping, UvTransform};
 pub use noise::Noise;
-pub use pattern::{HeightSlopes, Pattern, PatternTexture};
+pub use pattern::{HeightGradient, Pattern, PatternTexture};
 pub use stripes::{Bands, Checker};
 pub use wrap::Wrap;
 
@@ -88,9 +88,9 @@ impl Texture {
     }
 
     /// Slopes of the red channel, along u and v of [`Texture::uv_set_tangents`] or in world coordinates.
-    pub fn slopes(&self, at: &TexturePoint) -> HeightSlopes {
+    pub fn slopes(&self, at: &TexturePoint) -> HeightGradient {
         match self {
-            Self::Image(image) => HeightSlopes::AlongUv(image.slopes(at)),
+            Self::Image(image) => HeightGradient::AlongUv(image.slopes(at)),
             Self::Pattern(pattern) => pattern.slopes(at),
         }
     }
@@ -103,7 +103,7 @@ impl Texture {
 
     /// Whether [`Texture::coverage_above_cutoff`] is known for any footprint.
     #[inline]
-    pub fn has_footprint_coverage(&self) -> bool {
+    pub fn has_coverage_above_cutoff(&self) -> bool {
         match self {
             Self::Image(image) => image.mipmaps.is_some(),
             Self::Pattern(_) => true,

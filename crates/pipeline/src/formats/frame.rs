@@ -26,7 +26,7 @@ pub(super) struct CameraPose {
 
 impl ViewSide {
     /// Direction from the model to the camera, and the image's up vector. The model's front faces +z.
-    fn to_camera_and_up_axes(self) -> (DVec3, DVec3) {
+    fn camera_and_up_directions(self) -> (DVec3, DVec3) {
         match self {
             Self::Front => (DVec3::Z, DVec3::Y),
             Self::Back => (DVec3::NEG_Z, DVec3::Y),
@@ -48,7 +48,7 @@ pub(super) fn frame_model(
     turns: u32,
     aspect: f64,
 ) -> CameraPose {
-    let (back, up) = from.to_camera_and_up_axes();
+    let (back, up) = from.camera_and_up_directions();
     let middle = (min + max) * 0.5;
     let tangent = libm::tan((FOV * 0.5).to_radians()) * MAX_FILL;
     // Move the camera back until every point is inside the frame.

@@ -7,7 +7,7 @@ use std::path::Path;
 use super::foreign::ForeignError;
 use super::frame::{FOV, frame_model};
 use super::model::{
-    DEFAULT_SIZE, Lighting, POLISHED_EXPONENT, POLISHED_ROUGHNESS, UsedNames, add_camera, add_ground,
+    DEFAULT_SIZE, Lighting, POLISHED_EXPONENT, POLISHED_ROUGHNESS, UsedNames, add_camera_table, add_ground,
     add_render_settings, add_sky_and_key_light, file_name, model_warning,
 };
 use super::{ForeignReadContext, ForeignScene};
@@ -79,7 +79,7 @@ fn is_mesh_fully_transparent(loaded: &LoadedMesh) -> bool {
 }
 
 /// Reads an OBJ, OFF or serialized file.
-pub(super) fn read_obj_or_off(
+pub(super) fn read_y_up_mesh(
     path: &Path,
     context: &ForeignReadContext<'_>,
 ) -> Result<ForeignScene, ForeignError> {
@@ -134,7 +134,7 @@ fn scene_of_mesh(
     document.add_comment_above_next_table(format!("{}, as glimt shows it.", file_name(path)));
     let lighting = Lighting::Default { is_polished: loaded.materials.iter().any(material_may_cast_caustics) };
     add_render_settings(&mut document, None, lighting);
-    add_camera(&mut document, &eye, ModelProjection::Perspective { fov: FOV });
+    add_camera_table(&mut document, &eye, ModelProjection::Perspective { fov: FOV });
     add_sky_and_key_light(&mut document, &eye, lighting);
     let is_colored = !loaded.mesh.colors.is_empty();
     let needs_material = loaded.lacks_materials();

@@ -31,7 +31,7 @@ use crate::scene::{
     LoadedScene, MODEL_NOT_FOUND, NEW_SCENE_HELP, SceneDocumentBuilder, lacks_camera_header, load_built,
     missing_file_help,
 };
-use crate::system::file::{FileKind, file_kind};
+use crate::system::file::{FileKind, file_kind_and_metadata};
 
 pub use import::{ImportError, import_scene};
 
@@ -40,7 +40,7 @@ const FORMATS: [ForeignFormat; 6] = [
     ForeignFormat {
         extensions: &["obj", "off", "serialized"],
         is_model: true,
-        read: mesh::read_obj_or_off,
+        read: mesh::read_y_up_mesh,
         convert: None,
     },
     ForeignFormat { extensions: &["ply"], is_model: true, read: mesh::read_ply, convert: None },
@@ -51,7 +51,12 @@ const FORMATS: [ForeignFormat; 6] = [
         read: gltf::read,
         convert: Some(gltf::convert),
     },
-    ForeignFormat { extensions: &["pbrt"], is_model: false, read: pbrt::read, convert: Some(pbrt::convert) },
+    ForeignFormat {
+        extensions: &["pbrt"],
+        is_model: false,
+        read: pbrt::read_glimt_scene,
+        convert: Some(pbrt::convert),
+    },
     ForeignFormat {
         extensions: &["xml"],
         is_model: false,
@@ -162,7 +167,7 @@ impl ForeignFormat {
 
 /// Returns the error for a file that is not a scene file, or `None` if the file must be read as a scene file.
 /// Files with the extension of a foreign format are not scene files unless they have a scene's header.
-pub fn foreign_file_error(path: &Path) -> Option<Diagnostic> {
+pub fn not_a_scene_file_error(path: &Path) -> Option<Diagnostic> {
     let error = |message: String, help| {
         Some(Diagnostic { help, ..Diagnostic::about_file(path, Severity::Error, message) })
     };
@@ -174,7 +179,7 @@ pub fn foreign_file_error(path: &Path) -> Option<Diagnostic> {
         return error(format!("glimt cannot read .{extension} models"), Some(help));
     }
     ForeignFormat::from_extension(path)?;
-    match file_kind(path) {
+    match file_kind_and_metadata(path) {
         Ok((FileKind::Regular, _)) if lacks_camera_header(path) => {
             let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
             let help = format!(
@@ -244,7 +249,7 @@ mod tests {
     }
 
     fn message(path: &Path) -> Diagnostic {
-        foreign_file_error(path).expect("a diagnostic")
+        not_a_scene_file_error(path).expect("a diagnostic")
     }
 
     #[test]
@@ -260,7 +265,7 @@ mod tests {
         }
         std::fs::create_dir(folder.path().join("folder.ply")).expect("made");
         assert!(message(&folder.path().join("folder.ply")).message.ends_with("not a model"));
-        assert_eq!(foreign_file_error(&folder.path().join("missing.fbx")), None);
+        assert_eq!(not_a_scene_file_error(&folder.path().join("missing.fbx")), None);
     }
 
     #[test]
@@ -283,7 +288,7 @@ mod tests {
                 assert!(help.contains(&format!("`file = \"{name}\"`")), "{help}");
             }
             std::fs::write(&path, "[camera]\n").expect("written");
-            assert_eq!(foreign_file_error(&path), None);
+            assert_eq!(not_a_scene_file_error(&path), None);
         }
     }
 }

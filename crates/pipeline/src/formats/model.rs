@@ -148,7 +148,11 @@ pub(super) fn add_render_settings(
 
 /// Adds the `[camera]` table. Keeps all digits of the points, because a small model may be far from the
 /// origin.
-pub(super) fn add_camera(document: &mut SceneDocumentBuilder, eye: &CameraPose, projection: ModelProjection) {
+pub(super) fn add_camera_table(
+    document: &mut SceneDocumentBuilder,
+    eye: &CameraPose,
+    projection: ModelProjection,
+) {
     document.start_table("camera");
     document.set("position", eye.position);
     document.set("look_at", eye.look_at);

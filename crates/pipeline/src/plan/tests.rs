@@ -22,7 +22,7 @@ fn command_line_takes_precedence_over_scene() {
     let changed = planned(text, &overrides);
     assert_eq!(size(&changed), (8, 24, 2));
     assert_eq!(
-        (changed.limits.threads, changed.settings.render.seed, changed.effective_settings().width),
+        (changed.limits.threads, changed.settings.render.seed, changed.effective_settings_summary().width),
         (3, 9, 8)
     );
 }
@@ -98,9 +98,9 @@ fn scene_accepts_exactly_the_supported_formats() {
 #[test]
 fn depth_of_field_needs_an_aperture() {
     let on = Overrides { dof: Some(true), ..Default::default() };
-    assert!(!planned("", &on).effective_settings().dof);
+    assert!(!planned("", &on).effective_settings_summary().dof);
     let lens = "[camera]\naperture = 0.1\n";
-    assert!(planned(lens, &Overrides::default()).effective_settings().dof);
+    assert!(planned(lens, &Overrides::default()).effective_settings_summary().dof);
     assert!(!planned(lens, &Overrides { dof: Some(false), ..Default::default() }).settings.dof);
 }
 

@@ -8,7 +8,7 @@ use crate::scene::fingerprint::Fingerprint;
 use crate::stages::FileReadContext;
 use crate::stages::meshes::MeshesByFileIndex;
 use crate::stages::parse::ParsedScene;
-use crate::stages::textures::{NeededTextures, Textures};
+use crate::stages::textures::{LoadedTextures, NeededTextures};
 use crate::watch::content::FilePathAndContentId;
 use crate::world::GlassSolids;
 
@@ -18,7 +18,7 @@ pub(crate) struct SceneAssets {
     pub(crate) parsed: Arc<ParsedScene>,
     pub(crate) meshes: MeshesByFileIndex,
     pub(super) glass: Arc<GlassSolids>,
-    pub(crate) textures: Arc<Textures>,
+    pub(crate) textures: Arc<LoadedTextures>,
     /// Textures that were needed when `textures` was loaded.
     pub(super) needed: NeededTextures,
     /// All files that were read for the scene, with their contents.

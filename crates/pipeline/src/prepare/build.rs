@@ -47,7 +47,7 @@ impl SceneCache {
         let camera =
             RequestCamera::new(scene, assets.parsed.orbiter, change).rotated_for_turntable(plan.turn);
         let (mesh_keys, orbiter) = (assets.mesh_keys(), camera.orbiter_fingerprint_text());
-        let of = keys::scene_fingerprint_context(scene, &mesh_keys, orbiter.as_deref());
+        let of = keys::scene_fingerprint_references(scene, &mesh_keys, orbiter.as_deref());
         let origin = camera.origin_near_camera();
         let stage = table.start(Stage::Accel);
         let (meshes, cache) = (&assets.meshes, &mut self.accel);

@@ -39,7 +39,7 @@ impl RequestCamera {
     }
 
     pub(crate) fn resolved_camera(&self) -> ResolvedCamera {
-        world::Camera::resolve_look_at_camera(&self.camera, self.orbiter.as_ref())
+        world::Camera::resolve_to_look_at(&self.camera, self.orbiter.as_ref())
     }
 
     /// Returns the coordinate origin that maximizes precision near the camera.

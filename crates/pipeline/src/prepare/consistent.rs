@@ -50,7 +50,7 @@ impl FileReader<'_> {
             let files = self.file_read_context(&contents, &containers);
             let result = read(&mut SceneReadAttempt { files, table, findings });
             if result.is_err() && !self.token.is_canceled() {
-                contents.recheck_seen_files(self.token)?;
+                contents.record_changes_to_seen_files(self.token)?;
             }
             if self.token.is_canceled() || contents.changed_file().is_none() {
                 return result;
@@ -67,13 +67,13 @@ impl FileReader<'_> {
     ///
     /// # Errors
     /// Returns the error from `read`.
-    pub(crate) fn read_unless_files_change<T>(
+    pub(crate) fn read_once_if_files_unchanged<T>(
         &self,
         read: impl FnOnce(&FileReadContext<'_>) -> Result<T, AbortReason>,
     ) -> Result<Option<T>, AbortReason> {
         let contents = FilesSeenByRequest::new(Arc::clone(self.contents));
         let result = read(&self.file_read_context(&contents, &GltfContainers::default()))?;
-        contents.recheck_seen_files(self.token)?;
+        contents.record_changes_to_seen_files(self.token)?;
         Ok(Some(result).filter(|_| contents.changed_file().is_none()))
     }
 
@@ -94,7 +94,7 @@ impl SceneReadAttempt<'_, '_> {
     /// # Errors
     /// A file has changed, or the token is canceled.
     pub(crate) fn verify_files_unchanged(&self) -> Result<(), AbortReason> {
-        self.files.contents.recheck_seen_files(self.files.token)?;
+        self.files.contents.record_changes_to_seen_files(self.files.token)?;
         let changed = self.files.contents.changed_file();
         let message = |path: PathBuf| format!("{} changed while it was being read", path.display());
         changed.map_or(Ok(()), |path| Err(AbortReason::from_work_error(message(path))))

@@ -23,7 +23,7 @@ use crate::stages::accel::AccelCache;
 use crate::stages::coplanar::warn_about_coplanar_lights;
 use crate::stages::glass::find_glass_solids;
 use crate::stages::lights::LightCache;
-use crate::stages::meshes::{CachedMesh, MeshIdentity, load_meshes};
+use crate::stages::meshes::{CachedMesh, MeshPathAndOptions, load_meshes};
 use crate::stages::parse::{ParsedScene, SceneParseRequest, parse};
 use crate::stages::textures::{TextureCache, TextureSelection, find_needed_textures, load_textures};
 use crate::stages::{AbortReason, FileReadContext, Findings};
@@ -36,7 +36,7 @@ const MAX_SPARE_BYTES: usize = 256 << 20;
 #[derive(Default)]
 pub(crate) struct SceneCache {
     parsed: Memo<Arc<ParsedScene>>,
-    meshes: CacheOfNamedValues<MeshIdentity, CachedMesh>,
+    meshes: CacheOfNamedValues<MeshPathAndOptions, CachedMesh>,
     glass: Memo<Arc<GlassSolids>>,
     coplanar: Memo<Vec<CoplanarLight>>,
     textures: TextureCache,

@@ -30,7 +30,7 @@ impl<'a> CoarseImageRenderer<'a> {
     /// Returns the sizes of the first images: about the preview's size, preceded by a smaller size if the
     /// camera is being moved. Excludes sizes that would take almost as long as a full pass.
     pub(crate) fn sizes(&self, shown_width: u32, shown_height: u32) -> Vec<(u32, u32)> {
-        let (width, height) = self.reduce_size_for_large_scenes(shown_width, shown_height);
+        let (width, height) = self.size_reduced_for_large_scene(shown_width, shown_height);
         let rate = self.rate.get().filter(|_| self.is_moved);
         let hasty = rate.and_then(|rate| size_for_time_budget(width, height, rate));
         let sizes = hasty.into_iter().chain([(width, height)]);
@@ -39,7 +39,7 @@ impl<'a> CoarseImageRenderer<'a> {
 
     /// Returns the preview's size, or a size with half as many pixels if the trees do not fit in the CPU
     /// caches, because tracing rays is then slow.
-    fn reduce_size_for_large_scenes(&self, width: u32, height: u32) -> (u32, u32) {
+    fn size_reduced_for_large_scene(&self, width: u32, height: u32) -> (u32, u32) {
         /// Trees with this many triangles take up tens of megabytes.
         const MIN_LARGE_TRIANGLES: u64 = 250_000;
         let side =

@@ -149,7 +149,7 @@ impl FilmState {
     }
 
     /// Reads the sample counts from the film.
-    pub(super) fn recount_samples(&mut self) {
+    pub(super) fn update_sample_counts_from_film(&mut self) {
         let halves: Vec<_> = self.cell_half_indices_in_shard().collect();
         for (cell, half) in halves {
             self.done[cell][half] = self.film.cell_half_samples_per_pixel(cell, half);
@@ -271,7 +271,7 @@ impl FilmState {
     }
 
     /// Records a finished job and its cost. Returns the job's total sample count over all pixels.
-    pub(crate) fn record_job(&mut self, job: &TileJob, cost: &TraceCost) -> u64 {
+    pub(crate) fn record_finished_job(&mut self, job: &TileJob, cost: &TraceCost) -> u64 {
         let (rays, seconds) = (cost.rays.total_rays(), cost.seconds / job.pixels.rect.area() as f64);
         for cell in CELLS * job.tile..CELLS * (job.tile + 1) {
             let cell_rect = self.film.noise_cell_rect(cell);
@@ -291,8 +291,8 @@ impl FilmState {
     }
 
     /// Decides which of the tiles with `samples` samples (a power of two) need no more samples.
-    pub(crate) fn decide_goals(&mut self, samples: u32, error: f64) {
-        if let Some(judgement) = self.goals.decide_goals(&self.film, &self.done, samples, error) {
+    pub(crate) fn decide_tile_sample_goals(&mut self, samples: u32, error: f64) {
+        if let Some(judgement) = self.goals.decide_tile_sample_goals(&self.film, &self.done, samples, error) {
             self.expected.update_predictions(&judgement, &self.goals, &self.done);
         }
     }
@@ -311,7 +311,7 @@ impl FilmState {
     /// Returns the expected final number of samples, summed over all pixels, with at most `most` samples per
     /// pixel.
     pub(crate) fn expected_total_samples(&self, most: u32) -> u64 {
-        self.sum_pixel_samples(|cell, half| self.expected_cell_half_samples(cell, half, most))
+        self.sum_pixel_samples(|cell, half| self.expected_final_samples_in_half(cell, half, most))
     }
 
     /// Returns the CPU seconds spent so far.
@@ -328,7 +328,8 @@ impl FilmState {
             |cell: &usize| self.is_tile_in_shard(cell / CELLS) && self.film.noise_cell_rect(*cell).is_some();
         for cell in (0..self.done.len()).filter(is_there) {
             let remaining_samples = |half: usize| {
-                let (done, end) = (self.done[cell][half], self.expected_cell_half_samples(cell, half, most));
+                let (done, end) =
+                    (self.done[cell][half], self.expected_final_samples_in_half(cell, half, most));
                 let pixels = self.film.cell_half_pixel_count(cell, half) as f64;
                 let samples = pixels * f64::from(end.saturating_sub(done));
                 self.pixel_share.samples_including_overhead(samples, pixels * f64::from(jobs(done, end)))
@@ -355,17 +356,17 @@ impl FilmState {
         };
         [
             max_of(&|cell, half| self.done[cell][half]),
-            max_of(&|cell, half| self.expected_cell_half_samples(cell, half, most)),
+            max_of(&|cell, half| self.expected_final_samples_in_half(cell, half, most)),
         ]
     }
 
     /// Whether the final number of samples can be estimated despite a noise target.
     pub(crate) fn can_predict_samples(&self) -> bool {
         self.cell_half_indices_in_shard()
-            .all(|(cell, half)| self.expected_cell_half_samples(cell, half, u32::MAX) < u32::MAX)
+            .all(|(cell, half)| self.expected_final_samples_in_half(cell, half, u32::MAX) < u32::MAX)
     }
 
-    fn expected_cell_half_samples(&self, cell: usize, half: usize, most: u32) -> u32 {
+    fn expected_final_samples_in_half(&self, cell: usize, half: usize, most: u32) -> u32 {
         let (goal, expected) = (self.goals.get(cell, half), self.expected.get(cell, half));
         (if goal < u32::MAX { goal } else { expected }).min(most)
     }
@@ -426,7 +427,7 @@ mod tests {
     }
 
     /// Adds samples to a tile and records how long they took.
-    fn record_job(state: &mut FilmState, tile: usize, samples: Range<u32>, seconds: f64) {
+    fn record_finished_job(state: &mut FilmState, tile: usize, samples: Range<u32>, seconds: f64) {
         let pixels = SelectedPixels::from(state.film.tile_rect(tile).expect("a tile"));
         let count = samples.end - samples.start;
         let radiance = (0..pixels.count() as u32 * count).map(|i| Vec3::splat((i % 7) as f32)).collect();
@@ -435,14 +436,14 @@ mod tests {
             TileSamples { pixels, samples: count, radiance, negative: None, layers: Default::default() },
         );
         let job = TileJob { tile, pixels, samples };
-        state.record_job(&job, &TraceCost { rays: RayCounters::default(), seconds });
+        state.record_finished_job(&job, &TraceCost { rays: RayCounters::default(), seconds });
     }
 
     #[test]
     fn remaining_cost_is_estimated_per_tile() {
         let mut state = state();
         let mut noted = |tile: usize, samples: Range<u32>, seconds: f64| {
-            record_job(&mut state, tile, samples, seconds);
+            record_finished_job(&mut state, tile, samples, seconds);
             [state.cpu_seconds(), state.remaining_cpu_seconds(8, in_one)]
                 .map(|seconds| (seconds * 1e6).round() * 1e-6)
         };
@@ -458,8 +459,8 @@ mod tests {
     fn recent_samples_determine_the_cost() {
         let mut state = state();
         for tile in 0..2 {
-            record_job(&mut state, tile, 0..1, 4.0);
-            record_job(&mut state, tile, 1..2, 1.0);
+            record_finished_job(&mut state, tile, 0..1, 4.0);
+            record_finished_job(&mut state, tile, 1..2, 1.0);
         }
         assert_eq!(state.cpu_seconds(), 10.0);
         // The first job has a weight of 1/4 and the second a weight of 1, which gives 2 seconds for 1.25
@@ -476,8 +477,8 @@ mod tests {
         let mut state = state();
         // One second per sample plus three seconds of pixel overhead per job.
         for (samples, seconds) in [(0..1, 4.0), (1..2, 4.0), (2..4, 5.0)] {
-            record_job(&mut state, 0, samples.clone(), seconds);
-            record_job(&mut state, 1, samples, seconds);
+            record_finished_job(&mut state, 0, samples.clone(), seconds);
+            record_finished_job(&mut state, 1, samples, seconds);
         }
         let to_come = |jobs: u32| state.remaining_cpu_seconds(16, |_, _| jobs);
         assert!((to_come(1) - 2.0 * (12.0 + 3.0)).abs() < 1e-9, "{}", to_come(1));
@@ -487,13 +488,13 @@ mod tests {
     #[test]
     fn end_is_unknown_until_noise_is_measured() {
         let mut state = state();
-        record_job(&mut state, 0, 0..1, 1.0);
-        record_job(&mut state, 1, 0..1, 1.0);
-        state.decide_goals(1, 0.1);
+        record_finished_job(&mut state, 0, 0..1, 1.0);
+        record_finished_job(&mut state, 1, 0..1, 1.0);
+        state.decide_tile_sample_goals(1, 0.1);
         assert!(!state.can_predict_samples(), "noise cannot be estimated from one sample");
-        record_job(&mut state, 0, 1..2, 1.0);
-        record_job(&mut state, 1, 1..2, 1.0);
-        state.decide_goals(2, 0.1);
+        record_finished_job(&mut state, 0, 1..2, 1.0);
+        record_finished_job(&mut state, 1, 1..2, 1.0);
+        state.decide_tile_sample_goals(2, 0.1);
         assert!(state.can_predict_samples());
     }
 }

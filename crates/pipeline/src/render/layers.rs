@@ -9,7 +9,7 @@ use crate::film::{FilmQuantity, RadianceImage};
 use crate::integrators::SampleLayer;
 use crate::output::LayerImage;
 use crate::plan::RenderPlan;
-use crate::settings::{LayerSource, OutputLayer};
+use crate::settings::{LayerValueSource, OutputLayer};
 
 /// Channel names that compositing programs expect for colors, directions and scalars.
 const COLOR: &[&str] = &["R", "G", "B"];
@@ -44,9 +44,9 @@ pub(crate) fn layer_images(state: &FilmState, plan: &RenderPlan) -> Vec<LayerIma
     };
     let of = |layer: &OutputLayer| {
         let image = match layer.source() {
-            LayerSource::Samples(layer) => take(layer)?,
-            LayerSource::Variance => squared_standard_error_image(state),
-            LayerSource::SampleCount => state.film.image(FilmQuantity::Samples),
+            LayerValueSource::Samples(layer) => take(layer)?,
+            LayerValueSource::Variance => squared_standard_error_image(state),
+            LayerValueSource::SampleCount => state.film.image(FilmQuantity::Samples),
         };
         Some(LayerImage { name: layer.name(), channels: layer.channel_names(), image })
     };

@@ -7,7 +7,7 @@
 //! worst case, this is a thirtieth of the noise.
 
 use crate::film::{
-    BrightnessPrepassPixels, CELLS, CellHalfNoise, ConvergenceModel, Film, PREPASS_SAMPLES,
+    BrightnessPrepassPixels, CELLS, ConvergenceModel, Film, HalfCellNoise, PREPASS_SAMPLES,
     total_samples_to_reduce_error,
 };
 
@@ -63,7 +63,7 @@ impl CellSampleGoals {
     /// Decides the goals of undecided halves with `samples` samples (a power of two), based on the noise in
     /// the other half. `done` is the number of samples in each half. Decides nothing until all halves have
     /// enough samples to estimate the image's brightness. Runs in parallel within a thread pool.
-    pub(crate) fn decide_goals(
+    pub(crate) fn decide_tile_sample_goals(
         &mut self,
         film: &Film,
         done: &[[u32; 2]],
@@ -98,7 +98,7 @@ impl CellSampleGoals {
             let count = halves().count() as f64;
             let all =
                 halves().fold((0.0, 0.0), |(v, m), one| (v + one.variance / count, m + one.mean / count));
-            let whole = halves().next().map(|half| CellHalfNoise { variance: all.0, mean: all.1, ..half });
+            let whole = halves().next().map(|half| HalfCellNoise { variance: all.0, mean: all.1, ..half });
             let mut cells = self.decided.iter().skip(CELLS * tile).take(CELLS);
             whole.filter(|_| cells.all(is_decided)).map(|noise| aim.noise_relative_to_brightness(&noise))
         });
@@ -161,7 +161,7 @@ pub(crate) struct NoiseMeasurements {
 /// A tile's noise, measured from its samples.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TileNoise {
-    pub(crate) halves: [Option<CellHalfNoise>; 2],
+    pub(crate) halves: [Option<HalfCellNoise>; 2],
     /// Ratio of the variances before and after the last doubling of samples.
     pub(crate) fall: Option<f64>,
 }
@@ -172,7 +172,7 @@ impl TileNoise {
             let noise = film.noise_in_tile_half(tile, half)?;
             // Use an upper bound on the noise. If the noise comes from a few bright samples, there may be
             // other bright samples that have not been taken yet.
-            Some(CellHalfNoise {
+            Some(HalfCellNoise {
                 variance: noise.variance * (1.0 + film.tile_variance_uncertainty(tile, half)),
                 ..noise
             })
@@ -193,7 +193,7 @@ pub(crate) struct NoiseTarget {
 
 impl NoiseTarget {
     /// Returns the number of samples needed for the noise to reach the target.
-    fn samples_to_reach(&self, noise: &CellHalfNoise) -> u32 {
+    fn samples_to_reach(&self, noise: &HalfCellNoise) -> u32 {
         let relative = self.noise_relative_to_brightness(noise);
         if !(relative > 0.0) {
             return noise.samples;
@@ -212,7 +212,7 @@ impl NoiseTarget {
     }
 
     /// Returns the noise relative to the reference brightness.
-    pub(crate) fn noise_relative_to_brightness(&self, noise: &CellHalfNoise) -> f64 {
+    pub(crate) fn noise_relative_to_brightness(&self, noise: &HalfCellNoise) -> f64 {
         noise.variance.sqrt() / noise.mean.max(MIN_BRIGHTNESS * self.brightness)
     }
 }
@@ -241,16 +241,16 @@ pub(crate) mod tests {
         film
     }
 
-    fn judged(halves: [(f32, f32); 2], samples: u32, error: f64) -> CellSampleGoals {
+    fn decided_goals(halves: [(f32, f32); 2], samples: u32, error: f64) -> CellSampleGoals {
         let mut goals = CellSampleGoals::new_undecided(1);
-        goals.decide_goals(&film(halves, samples), &[[samples; 2]], samples, error);
+        goals.decide_tile_sample_goals(&film(halves, samples), &[[samples; 2]], samples, error);
         goals
     }
 
     #[test]
     fn each_half_stops_based_on_the_other_half() {
         // The first half is smooth, but the second is noisy.
-        let goals = judged([(1.0, 0.0), (1.0, 1.0)], 16, 0.01);
+        let goals = decided_goals([(1.0, 0.0), (1.0, 1.0)], 16, 0.01);
         assert_eq!(goals.get(0, 1), 16, "the second half should stop because the first has no noise");
         assert_eq!(goals.get(0, 0), u32::MAX);
     }
@@ -258,13 +258,13 @@ pub(crate) mod tests {
     #[test]
     fn tiles_noisy_after_merging_halves_are_counted() {
         let rough = film([(1.0, 0.0), (1.0, 1.0)], 16);
-        let goals = judged([(1.0, 0.0), (1.0, 1.0)], 16, 0.01);
+        let goals = decided_goals([(1.0, 0.0), (1.0, 1.0)], 16, 0.01);
         assert_eq!(
             goals.count_finished_tiles_above_target(&rough, 0.01),
             None,
             "the first half should continue"
         );
-        let clean = judged([(1.0, 0.0); 2], 16, 0.01);
+        let clean = decided_goals([(1.0, 0.0); 2], 16, 0.01);
         assert_eq!(clean.count_finished_tiles_above_target(&film([(1.0, 0.0); 2], 16), 0.01), None);
         // One of the two halves has a standard error of √(1/12/16).
         let Some((tiles, worst)) = clean.count_finished_tiles_above_target(&rough, 0.01) else {
@@ -276,7 +276,7 @@ pub(crate) mod tests {
     #[test]
     fn nothing_is_decided_with_too_few_samples() {
         for (samples, is_open) in [(8, true), (16, false)] {
-            let goals = judged([(1.0, 0.0); 2], samples, 0.01);
+            let goals = decided_goals([(1.0, 0.0); 2], samples, 0.01);
             assert_eq!(goals.get(0, 0) == u32::MAX, is_open, "{samples}");
         }
     }
@@ -285,9 +285,9 @@ pub(crate) mod tests {
     fn goal_within_next_doubling_is_decided() {
         // The standard error is √(1/12/16) = 0.072, or up to 0.082 with so few pixels. Reaching the target
         // takes 24 samples.
-        let goals = judged([(1.0, 1.0); 2], 16, 0.08);
+        let goals = decided_goals([(1.0, 1.0); 2], 16, 0.08);
         assert!((17..=32).contains(&goals.get(0, 0)), "{}", goals.get(0, 0));
-        assert_eq!(judged([(1.0, 1.0); 2], 16, 0.005).get(0, 0), u32::MAX);
+        assert_eq!(decided_goals([(1.0, 1.0); 2], 16, 0.005).get(0, 0), u32::MAX);
     }
 
     #[test]
@@ -310,13 +310,13 @@ pub(crate) mod tests {
             );
         }
         let mut goals = CellSampleGoals::new_undecided(2 * CELLS);
-        goals.decide_goals(&film, &[[16; 2]; 2 * CELLS], 16, 0.01);
+        goals.decide_tile_sample_goals(&film, &[[16; 2]; 2 * CELLS], 16, 0.01);
         assert_eq!((goals.get(0, 0), goals.get(CELLS, 0)), (u32::MAX, 16));
     }
 
     /// Returns the mean over a tile with rare bright samples and an expected value of 1. Each half stops
     /// based on the noise of the other half, or on its own noise if `by_own`.
-    fn stopped(next: &mut impl FnMut() -> f32, by_own: bool) -> f64 {
+    fn mean_of_stopped_tile(next: &mut impl FnMut() -> f32, by_own: bool) -> f64 {
         const MAX_SAMPLES: u32 = 256;
         let film = Film::new(4, 4, None).expect("a film");
         let (mut goals, mut done) = (CellSampleGoals::new_undecided(1), [[0; 2]]);
@@ -333,7 +333,7 @@ pub(crate) mod tests {
                 );
                 done[0][half] += samples;
             }
-            goals.decide_goals(&film, &done, target, 0.6);
+            goals.decide_tile_sample_goals(&film, &done, target, 0.6);
         }
         film.mean_luminance().expect("samples")
     }
@@ -343,7 +343,7 @@ pub(crate) mod tests {
         let mut next = unit_generator(11);
         let mut mean_of = |by_own| {
             const TILES: u32 = 20_000;
-            let means: Vec<f64> = (0..TILES).map(|_| stopped(&mut next, by_own)).collect();
+            let means: Vec<f64> = (0..TILES).map(|_| mean_of_stopped_tile(&mut next, by_own)).collect();
             let mean = means.iter().sum::<f64>() / f64::from(TILES);
             let variance = means.iter().map(|one| (one - mean).powi(2)).sum::<f64>() / f64::from(TILES);
             (mean, (variance / f64::from(TILES)).sqrt())

@@ -51,7 +51,7 @@ impl PreviewSender<'_> {
 
     /// Spends a short time between tiles on updating the preview, on the current thread. Returns whether it
     /// was completed and sent.
-    pub(crate) fn update_briefly_and_send(&self, state: &mut FilmState) -> bool {
+    pub(crate) fn advance_and_send_if_complete(&self, state: &mut FilmState) -> bool {
         let Some((width, height)) = self.fitted_image_size() else { return false };
         if self.send_section_if_requested(state, false) {
             return true;
@@ -69,7 +69,7 @@ impl PreviewSender<'_> {
         if let Some(previewer) = &state.previewer {
             // The first image contains no sample statistics.
             let base = state.base.as_ref().filter(|_| previewer.quantity() == FilmQuantity::Radiance);
-            let image = previewer.build_image(base);
+            let image = previewer.build_radiance_image(base);
             self.send(state, &image, &self.choose_tone_mapping(state, &image, has_time), None);
         }
     }

@@ -219,7 +219,7 @@ impl<'s, 'a> Scheduler<'s, 'a> {
         let done = self.state.min_unfinished_samples_in(part, samples);
         // With fewer samples, no goals are decided.
         if error > 0.0 && (MIN_SAMPLES..samples).contains(&done) && done.is_power_of_two() {
-            self.rendering.tracer.pool.install(|| self.state.decide_goals(done, error.into()));
+            self.rendering.tracer.pool.install(|| self.state.decide_tile_sample_goals(done, error.into()));
         }
     }
 
@@ -242,7 +242,10 @@ impl<'s, 'a> Scheduler<'s, 'a> {
                 self.measure_noise_if_due();
             }
             if error > 0.0 && target.is_power_of_two() && !self.is_over_time {
-                self.rendering.tracer.pool.install(|| self.state.decide_goals(target, error.into()));
+                self.rendering
+                    .tracer
+                    .pool
+                    .install(|| self.state.decide_tile_sample_goals(target, error.into()));
                 self.forecast.update_total_work(self.state, most);
             }
         }
@@ -348,7 +351,7 @@ impl<'s, 'a> Scheduler<'s, 'a> {
         let keep = |job: &TileJob, samples: TileSamples| film.add_samples(job.tile, samples);
         tracer.run_all_jobs_in_parallel(&jobs, keep, |result| {
             if let Some((job, (), cost)) = result {
-                self.units += self.state.record_job(job, &cost);
+                self.units += self.state.record_finished_job(job, &cost);
                 self.rays += cost.rays;
             }
             self.run_due_tasks();
@@ -368,7 +371,7 @@ impl<'s, 'a> Scheduler<'s, 'a> {
         if let Some(bounds) = self.rendering.commands.pending.take_preview_resize() {
             (self.screen.bounds, self.next_preview) = (bounds, now);
         }
-        if now >= self.next_preview && self.screen.update_briefly_and_send(self.state) {
+        if now >= self.next_preview && self.screen.advance_and_send_if_complete(self.state) {
             self.next_preview = Instant::now() + PREVIEW_INTERVAL.max(now.elapsed() * PREVIEW_SHARE);
         }
         self.rendering.commands.run_pending(Some(self.state), !self.is_first);

@@ -80,7 +80,7 @@ impl Shard {
     }
 
     /// Returns the number of sample blocks in the image, or 0 if shares consist of tiles.
-    pub(crate) fn image_block_count(&self) -> u32 {
+    pub(crate) fn image_sample_block_count(&self) -> u32 {
         if self.blocks.is_some() { self.samples.div_ceil(BLOCK_SIZE) } else { 0 }
     }
 
@@ -149,6 +149,6 @@ mod tests {
         assert!((44..=84).contains(&first), "{first} of 128 in the first half");
         assert_eq!(share.summation_order(), SumOrder::SeparateBlocks(128));
         assert_eq!(Shard::new(1, 1, true, 40).summation_order(), SumOrder::SeparateBlocks(2));
-        assert_eq!(Shard::new(1, 1, true, 40).image_block_count(), 3);
+        assert_eq!(Shard::new(1, 1, true, 40).image_sample_block_count(), 3);
     }
 }

@@ -30,7 +30,7 @@ pub(crate) struct RequestResults<'a> {
 }
 
 pub(crate) fn make_report(finished: &RequestResults<'_>, stages: Vec<StageReport>, seconds: f64) -> Report {
-    let mut settings = finished.plan.effective_settings();
+    let mut settings = finished.plan.effective_settings_summary();
     // The plan has the samples of this process's share.
     if let Some(share) = &finished.state.share {
         settings.samples = share.samples;

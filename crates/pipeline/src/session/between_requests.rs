@@ -74,7 +74,7 @@ impl Session {
         if is_written {
             self.write_or_remove_report(current, sink);
         }
-        if self.is_own_image_written() {
+        if self.is_scene_image_written() {
             self.remove_scene_image_checkpoint(sink);
         }
     }
@@ -95,13 +95,13 @@ impl Session {
         let Some(state) = self.own.current.as_ref().and_then(|own| self.films.get(own.film)) else { return };
         if let Some(checkpointer) = self.own.checkpointer(state.key, &self.files.protected, sink) {
             checkpointer.detect_own_checkpoint(state);
-            checkpointer.finish(state, state.traced, true, Interruption::Replaced);
+            checkpointer.remove_or_save_checkpoint(state, state.traced, true, Interruption::Replaced);
         }
     }
 
     /// Saves a checkpoint of the scene's own image if the worker stops while showing another image.
     pub(crate) fn checkpoint_own_image(&self, sink: &EventSink, interruption: Interruption) {
-        let own = self.own.current.as_ref().filter(|_| !self.is_own_image_written());
+        let own = self.own.current.as_ref().filter(|_| !self.is_scene_image_written());
         let Some(state) = own.and_then(|own| self.films.get(own.film)).filter(|state| !state.is_kept) else {
             return;
         };

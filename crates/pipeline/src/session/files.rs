@@ -62,7 +62,7 @@ impl SceneFiles {
     }
 
     /// Records the outcome of a request, and reports the files that it read.
-    pub(super) fn end_request(
+    pub(super) fn record_request_outcome(
         &mut self,
         outcome: &Result<Report, AbortReason>,
         findings: &Findings,

@@ -47,8 +47,9 @@ impl Session {
         let pool = self.threads.get_or_create_pool(plans.shown.limits.threads, true)?;
         let reader = FileReader { contents: &self.contents, pool: &pool, sink, token };
         let roles = plans.texture_needs();
-        let assets = reader
-            .read_unless_files_change(|reading| self.scenes.load_missing_textures(last, roles, reading))?;
+        let assets = reader.read_once_if_files_unchanged(|reading| {
+            self.scenes.load_missing_textures(last, roles, reading)
+        })?;
         let Some(assets) = assets.flatten() else { return Ok(None) };
         *last = Arc::clone(&assets);
         let estimate = MemoryEstimate::for_image_and_scene(&plans.shown, &assets);

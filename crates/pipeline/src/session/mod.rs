@@ -25,7 +25,7 @@ use std::sync::Arc;
 
 use self::files::SceneFiles;
 use self::own_image::OwnImage;
-pub(super) use self::request::RequestOutcome;
+pub(super) use self::request::CompletedRequest;
 use crate::control::CancelToken;
 use crate::plan::RenderPlan;
 use crate::prepare::SceneCache;

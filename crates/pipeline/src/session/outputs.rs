@@ -37,20 +37,20 @@ impl Session {
         // Symbolic links and files may have changed during the render.
         let conflicts = output_conflicts(plan, &self.files.protected);
         findings.record_output_conflicts(conflicts, request.write, context.sink)?;
-        let was_own_written = self.is_own_image_written();
+        let was_own_written = self.is_scene_image_written();
         let stage = table.start(Stage::Write);
         let wrote = self.run_write_stage(context, plan, findings, pool).map(|staged| stage.finish(staged));
-        self.report_own_image_state(context, image);
+        self.report_scene_image_state(context, image);
         self.finish_checkpoint(context, image, wrote.as_ref().is_ok_and(|is_written| *is_written));
-        let has_written_own = request.own.is_some() && !was_own_written && self.is_own_image_written();
+        let has_written_own = request.own.is_some() && !was_own_written && self.is_scene_image_written();
         Ok(WriteOutcome { is_written: wrote?, has_written_own })
     }
 
     /// Reports the state of the scene's own image while another image is shown.
-    pub(super) fn report_own_image_state(&self, context: &RequestContext<'_>, image: &RequestImage) {
+    pub(super) fn report_scene_image_state(&self, context: &RequestContext<'_>, image: &RequestImage) {
         let Some(own) = self.own.current.as_ref().filter(|_| context.request.own.is_some()) else { return };
         let state = match self.films.get(own.film) {
-            _ if self.is_own_image_written() => SavedSceneRenderStatus::Written,
+            _ if self.is_scene_image_written() => SavedSceneRenderStatus::Written,
             Some(state) if state.has_samples() => {
                 SavedSceneRenderStatus::Begun { is_rendering: own.film == image.film }
             }
@@ -60,7 +60,7 @@ impl Session {
     }
 
     /// Whether the output files contain the current version of the scene's own image.
-    pub(super) fn is_own_image_written(&self) -> bool {
+    pub(super) fn is_scene_image_written(&self) -> bool {
         self.own.current.as_ref().is_some_and(|own| self.written.own == Some(own.image))
     }
 
@@ -106,7 +106,7 @@ impl Session {
         pool: &ThreadPool,
     ) -> Result<(), AbortReason> {
         let RequestContext { sink, writing: token, .. } = *context;
-        if self.is_own_image_written() || self.written.has_user_written_image_on_disk(&self.contents) {
+        if self.is_scene_image_written() || self.written.has_user_written_image_on_disk(&self.contents) {
             return Ok(());
         }
         let (Some(own), Some(state)) = (&self.own.current, self.films.current()) else { return Ok(()) };
@@ -125,10 +125,17 @@ impl Session {
 
     /// Removes or saves the checkpoint of the scene's own image after the write stage.
     fn finish_checkpoint(&self, context: &RequestContext<'_>, image: &RequestImage, is_written: bool) {
-        let Some(state) = self.films.current().filter(|_| context.request.writes_own_image()) else { return };
+        let Some(state) = self.films.current().filter(|_| context.request.should_write_scene_image()) else {
+            return;
+        };
         if let Some(checkpointer) = self.own.checkpointer(image.film, &self.files.protected, context.sink) {
-            let is_written = is_written || self.is_own_image_written();
-            checkpointer.finish(state, state.traced, is_written, context.commands.interruption());
+            let is_written = is_written || self.is_scene_image_written();
+            checkpointer.remove_or_save_checkpoint(
+                state,
+                state.traced,
+                is_written,
+                context.commands.interruption(),
+            );
         }
     }
 

@@ -9,7 +9,7 @@ use crate::inputs::ProtectedInputs;
 use crate::keys;
 use crate::plan::RenderPlan;
 use crate::prepare::{ReadyScene, RequestCamera, SceneAssets};
-use crate::render::checkpointer::{CheckpointContext, CheckpointLock, Checkpointer};
+use crate::render::checkpointer::{CheckpointContext, Checkpointer, ProcessCheckpointState};
 use crate::render::film_cache::FilmCache;
 use crate::render::share::Shard;
 use crate::scene::description::CameraOverrides;
@@ -19,7 +19,7 @@ use crate::sink::EventSink;
 use crate::stages::write::image_encoding_settings;
 
 /// The scene's own image for one version of the scene.
-pub(super) struct ImageOfSavedScene {
+pub(super) struct SavedSceneImageInputs {
     /// Key of the film.
     pub(super) film: Fingerprint,
     /// Key for the finished image and its output files.
@@ -31,7 +31,7 @@ pub(super) struct ImageOfSavedScene {
     pub(super) share: Option<Shard>,
 }
 
-impl ImageOfSavedScene {
+impl SavedSceneImageInputs {
     /// Computes the keys for the scene's own image. `scene` is the prepared scene of the request, and `plan`
     /// contains the settings of the scene's own image.
     fn new(scene: &ReadyScene, plan: RenderPlan, camera: CameraOverrides) -> Self {
@@ -39,7 +39,7 @@ impl ImageOfSavedScene {
         let eye =
             RequestCamera::new(&plan.scene, assets.parsed.orbiter, &camera).rotated_for_turntable(plan.turn);
         let (meshes, orbiter) = (assets.mesh_keys(), eye.orbiter_fingerprint_text());
-        let of = keys::scene_fingerprint_context(&plan.scene, &meshes, orbiter.as_deref());
+        let of = keys::scene_fingerprint_references(&plan.scene, &meshes, orbiter.as_deref());
         let world = keys::world_key(&scene.surfaces, &eye.camera, &of);
         let film = keys::film_sums_key(world, &plan.settings, plan.crop);
         let image = image_with_outputs_key(film, &plan);
@@ -71,16 +71,16 @@ fn image_with_outputs_key(film: Fingerprint, plan: &RenderPlan) -> Fingerprint {
 #[derive(Default)]
 pub(super) struct OwnImage {
     /// The image for the newest request with a valid scene.
-    pub(super) current: Option<ImageOfSavedScene>,
+    pub(super) current: Option<SavedSceneImageInputs>,
     /// Whether the film may be dropped while other images are rendered.
     pub(super) is_film_expendable: bool,
     /// Lock on the checkpoint file, and the checkpoints already reported.
-    checkpoint_lock: RefCell<CheckpointLock>,
+    checkpoint_lock: RefCell<ProcessCheckpointState>,
 }
 
 impl OwnImage {
     /// Sets the image for a request and keeps its film while other images are rendered. See
-    /// [`ImageOfSavedScene::new`].
+    /// [`SavedSceneImageInputs::new`].
     pub(super) fn set(
         &mut self,
         scene: &ReadyScene,
@@ -88,7 +88,7 @@ impl OwnImage {
         camera: CameraOverrides,
         films: &mut FilmCache,
     ) {
-        let mut image = ImageOfSavedScene::new(scene, plan, camera);
+        let mut image = SavedSceneImageInputs::new(scene, plan, camera);
         if !self.is_film_expendable {
             films.pin(image.film);
         }

@@ -39,7 +39,7 @@ impl Session {
         let read = |reading: &mut SceneReadAttempt<'_, '_>| self.read_scene(request, reading);
         let (assets, plans) = reader.read_until_files_unchanged(table, findings, read)?;
         let ready = self.build_world(request, Arc::new(assets), plans, table, pool)?;
-        self.written.record_scene_save_count(request.saves);
+        self.written.allow_replacing_if_scene_saved(request.saves);
         self.files.last_valid = Some(Arc::clone(&ready.assets));
         Ok(ready)
     }
@@ -106,9 +106,9 @@ impl Session {
         request: &Request,
         plans: &RequestPlans,
     ) -> Result<u64, AbortReason> {
-        let bytes = self.additional_film_bytes(request, plans);
+        let bytes = self.separate_own_film_bytes(request, plans);
         let all = estimate.clone().with_saved_scene_film(bytes).check(&plans.shown);
-        let is_expendable = all.is_err() && self.is_own_image_written();
+        let is_expendable = all.is_err() && self.is_scene_image_written();
         self.own.is_film_expendable = is_expendable;
         let room = if is_expendable { estimate.check(&plans.shown)? } else { all? };
         if is_expendable {
@@ -119,7 +119,7 @@ impl Session {
     }
 
     /// Returns the size of the own image's film in bytes if it is kept in addition to the request's film.
-    fn additional_film_bytes(&self, request: &Request, plans: &RequestPlans) -> u64 {
+    fn separate_own_film_bytes(&self, request: &Request, plans: &RequestPlans) -> u64 {
         let (Some(own), Some(own_plan)) = (&self.own.current, &plans.own) else { return 0 };
         let of = |plan: &RenderPlan| keys::film_sums_key(own.film, &plan.settings, plan.crop);
         let is_shared = of(&plans.shown) == of(own_plan)
@@ -151,7 +151,7 @@ fn send_settings(parsed: &ParsedScene, plan: &RenderPlan, sink: &EventSink) {
     let camera = RequestCamera::new(&plan.scene, parsed.orbiter, &CameraOverrides::default());
     sink.send(Event::Settings {
         generation: sink.generation,
-        settings: Box::new(plan.effective_settings()),
+        settings: Box::new(plan.effective_settings_summary()),
         own: AdjustableSceneSettings {
             camera: camera.resolved_camera(),
             exposure: scene.render.exposure,

@@ -64,7 +64,7 @@ impl Session {
         let coarse = CoarseImageRenderer {
             tracer: create_tracer(self.config.kernel, pool, &scene, token),
             plan,
-            is_moved: is_camera_moving(request),
+            is_moved: has_moved_camera(request),
             rate: &self.coarse_rate,
         };
         let stage = table.start(Stage::Photons);
@@ -117,8 +117,10 @@ impl Session {
             written: RefCell::new(&mut self.written),
             is_postponed: &context.is_postponed,
         };
-        let checkpointer =
-            request.writes_own_image().then(|| self.own.checkpointer(image.film, inputs, sink)).flatten();
+        let checkpointer = request
+            .should_write_scene_image()
+            .then(|| self.own.checkpointer(image.film, inputs, sink))
+            .flatten();
         let rendering = RenderStageInputs {
             film: FilmRequest {
                 key: image.film,
@@ -132,7 +134,7 @@ impl Session {
             display: PreviewOptions {
                 screen: PreviewSender { bounds: request.preview, plan, sink },
                 first: request.first,
-                is_moved: is_camera_moving(request),
+                is_moved: has_moved_camera(request),
                 coarse_rate: &self.coarse_rate,
             },
             commands: &commands,
@@ -153,7 +155,7 @@ impl Session {
     }
 }
 
-fn is_camera_moving(request: &Request) -> bool {
+fn has_moved_camera(request: &Request) -> bool {
     request.overrides.camera.has_changes()
 }
 

@@ -14,7 +14,7 @@ use crate::stopwatch::PausableStopwatch;
 use crate::table::StageRecorder;
 
 /// Outcome of a finished request.
-pub(crate) struct RequestOutcome {
+pub(crate) struct CompletedRequest {
     pub(crate) report: Report,
     /// Reasons why the image is not written.
     pub(crate) conflicts: Vec<Diagnostic>,
@@ -31,7 +31,7 @@ impl Session {
         let outcome = self.run_request(context);
         let is_broken = matches!(outcome, Err(AbortReason::Failed(Failure::Scene(_))));
         context.sink.send(match outcome {
-            Ok(RequestOutcome { report, conflicts, warnings, unchanged }) => {
+            Ok(CompletedRequest { report, conflicts, warnings, unchanged }) => {
                 let warnings = [conflicts, warnings].concat();
                 Event::Done { generation, report: Box::new(report), warnings, unchanged }
             }
@@ -47,7 +47,7 @@ impl Session {
     pub(crate) fn run_request(
         &mut self,
         context: &RequestContext<'_>,
-    ) -> Result<RequestOutcome, AbortReason> {
+    ) -> Result<CompletedRequest, AbortReason> {
         let RequestContext { request, sink, .. } = *context;
         sink.send(Event::Started { generation: request.generation });
         let mut findings = Findings::default();
@@ -63,13 +63,13 @@ impl Session {
                 self.write_report(report, sink, context.writing);
             }
         }
-        self.files.end_request(&outcome, &findings, sink);
+        self.files.record_request_outcome(&outcome, &findings, sink);
         let report = outcome?;
         let settled = |stage: Stage| report.stages[stage as usize].status != Status::Done;
         let unchanged =
             self.current_image_key_and_view() == before && settled(Stage::Render) && settled(Stage::Write);
         let Findings { conflicts, warnings, .. } = findings;
-        Ok(RequestOutcome { report, conflicts, warnings, unchanged })
+        Ok(CompletedRequest { report, conflicts, warnings, unchanged })
     }
 
     /// Runs all stages of a request and returns its report.
@@ -93,7 +93,7 @@ impl Session {
         // Trace photons and render the film.
         let mut image = self.make_current_and_trace_photons(context, scene?, &mut table, &pool)?;
         self.assign_share(context, &mut image);
-        self.report_own_image_state(context, &image);
+        self.report_scene_image_state(context, &image);
         let stage = table.start(Stage::Render);
         let rays = stage.finish(self.render(context, &image, &pool)?);
         // Write the image.
@@ -106,7 +106,7 @@ impl Session {
             state: self.films.current_or_error()?,
             films: &self.films,
             rays,
-            photons: image.photons.and_then(|key| self.photons.get(key)).map(PhotonStore::report),
+            photons: image.photons.and_then(|key| self.photons.get(key)).map(PhotonStore::to_photons_report),
         };
         let (stages, seconds) = (table.stages, watch.seconds());
         if let Some(own) = self.own.current.as_ref().filter(|_| wrote.has_written_own) {

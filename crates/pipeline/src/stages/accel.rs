@@ -100,7 +100,7 @@ fn separate_coincident_mesh_emitters(
     token: &CancelToken,
 ) -> Result<Vec<Option<KeyedMeshWithSeparateEmitters>>, AbortReason> {
     let distinct = |(mesh, is_emissive): (&Arc<CachedMesh>, bool)| {
-        let key = keys::mesh_with_separate_emitters_key(&mesh.key, is_emissive);
+        let key = keys::separated_emitters_mesh_key(&mesh.key, is_emissive);
         let found = match cache.distinct.get(&key, key) {
             Some(found) => found,
             None => {

@@ -58,7 +58,7 @@ impl GltfContainers {
         if let Some(bytes) = self.generated_file(path) {
             return load_from_bytes(path, &bytes, progress, token);
         }
-        if serialized::is_serialized(path) {
+        if serialized::has_serialized_extension(path) {
             return serialized::load(path, part, progress, token);
         }
         if !has_gltf_extension(path) {

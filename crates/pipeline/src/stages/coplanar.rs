@@ -27,7 +27,7 @@ pub(crate) fn warn_about_coplanar_lights(
     let origin = world::choose_origin_near_camera_target(&scene.camera, parsed.orbiter.as_ref());
     let mesh_keys: Vec<Fingerprint> = meshes.iter().map(|mesh| mesh.key).collect();
     let key = keys::key_with_coordinate_origin(
-        &keys::coplanar_lights_key(scene, &keys::scene_fingerprint_context(scene, &mesh_keys, None)),
+        &keys::coplanar_lights_key(scene, &keys::scene_fingerprint_references(scene, &mesh_keys, None)),
         origin,
     );
     let found = memo.get(key).cloned().unwrap_or_else(|| {

@@ -31,7 +31,7 @@ pub(crate) fn find_glass_solids(
 ) -> Result<Arc<GlassSolids>, AbortReason> {
     let scene = &loaded.scene;
     let mesh_keys: Vec<Fingerprint> = meshes.iter().map(|mesh| mesh.key).collect();
-    let key = keys::glass_key(scene, &keys::scene_fingerprint_context(scene, &mesh_keys, None));
+    let key = keys::glass_key(scene, &keys::scene_fingerprint_references(scene, &mesh_keys, None));
     let bodies = if let Some(bodies) = memo.get(key) {
         Arc::clone(bodies)
     } else {

@@ -6,14 +6,14 @@ use super::super::cache::Memo;
 use super::super::keys;
 use super::super::protocol::reasons;
 use super::StageResult;
-use super::textures::Textures;
+use super::textures::LoadedTextures;
 use crate::control::{CancelToken, Canceled};
 use crate::lights::infinite::EnvironmentMap;
 use crate::lights::infinite::sky::Sky;
 use crate::lights::{LightSamplingPurpose, Lights};
-use crate::scene::description::{MapRows, Material, Scene, TextureRole};
+use crate::scene::description::{MapRowPlacement, Material, Scene, TextureRole};
 use crate::scene::fingerprint::{Fingerprint, FingerprintContext, FingerprintHasher};
-use crate::world::{self, EnvironmentSource, Geometry, TextureImageSource};
+use crate::world::{self, EnvironmentSource, Geometry, TextureImageKey};
 
 /// Cache of the lights stage.
 #[derive(Default)]
@@ -30,7 +30,7 @@ pub(crate) fn collect_lights(
     scene: &Scene,
     of: &FingerprintContext<'_>,
     geometry: &Geometry,
-    textures: &Textures,
+    textures: &LoadedTextures,
     cache: &mut LightCache,
     token: &CancelToken,
 ) -> Result<StageResult<Arc<Lights>>, Canceled> {
@@ -41,7 +41,7 @@ pub(crate) fn collect_lights(
         scene,
         of,
         geometry.coordinate_origin(),
-        geometry.light_lifts_by_object(),
+        geometry.coplanar_light_offsets(),
         map,
         &patterns,
     );
@@ -73,7 +73,7 @@ fn describe_light_tree(which: &str, lights: &Lights) -> String {
 }
 
 /// Returns the textures used by the scene file's emissive materials.
-fn textures_affecting_emission(scene: &Scene) -> impl Iterator<Item = TextureImageSource> {
+fn textures_affecting_emission(scene: &Scene) -> impl Iterator<Item = TextureImageKey> {
     let shining = scene.materials.iter().filter(|material| material.emits());
     shining.flat_map(Material::self_and_blend_parts).flat_map(move |material| {
         let textures = material.own_textures_with_roles().into_iter().filter(|(_, role)| match role {
@@ -100,10 +100,10 @@ fn textures_affecting_emission(scene: &Scene) -> impl Iterator<Item = TextureIma
 fn environment_source(
     scene: &Scene,
     of: &FingerprintContext<'_>,
-    textures: &Textures,
+    textures: &LoadedTextures,
     cache: &mut LightCache,
 ) -> Option<EnvironmentSource> {
-    let rows = scene.environment.as_ref().map_or(MapRows::Centers, |environment| environment.rows);
+    let rows = scene.environment.as_ref().map_or(MapRowPlacement::Centers, |environment| environment.rows);
     let map = environment_map(textures, rows, &mut cache.environment);
     let Some(sky) = scene.environment.as_ref().and_then(|environment| environment.sky.as_ref()) else {
         cache.sky = Memo::default();
@@ -117,8 +117,8 @@ fn environment_source(
 }
 
 fn environment_map(
-    textures: &Textures,
-    rows: MapRows,
+    textures: &LoadedTextures,
+    rows: MapRowPlacement,
     memo: &mut Memo<Option<Arc<EnvironmentMap>>>,
 ) -> Option<Arc<EnvironmentMap>> {
     let Some((key, texels)) = &textures.environment else {

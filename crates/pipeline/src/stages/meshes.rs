@@ -53,7 +53,7 @@ pub(crate) type MeshesByFileIndex = Vec<Arc<CachedMesh>>;
 /// The token is canceled, or there is not enough memory.
 pub(crate) fn load_meshes(
     loaded: &LoadedScene,
-    cache: &mut CacheOfNamedValues<MeshIdentity, CachedMesh>,
+    cache: &mut CacheOfNamedValues<MeshPathAndOptions, CachedMesh>,
     findings: &mut Findings,
     reading: &FileReadContext<'_>,
 ) -> Result<StageResult<MeshesByFileIndex>, AbortReason> {
@@ -65,9 +65,9 @@ pub(crate) fn load_meshes(
     let before: Vec<(FileContentId, Option<Arc<CachedMesh>>)> = files
         .iter()
         .map(|file| {
-            let name = mesh_identity(file);
+            let name = mesh_path_and_options(file);
             let content = reading.contents.first_seen_content_id(&file.value, reading.token)?;
-            if let Some(last) = cache.get_by_name(&name) {
+            if let Some(last) = cache.get_even_if_stale(&name) {
                 // The mesh probably still references the same files, so hash them before they are read.
                 contents_as_seen_by_request(&last.companions, reading)?;
             }
@@ -98,7 +98,7 @@ pub(crate) fn load_meshes(
                 counts.kept += usize::from(was_kept);
                 counts.loaded += usize::from(!was_kept);
                 warnings.add_file_warnings(file, &mesh.mesh, uses_own);
-                let (name, key) = (mesh_identity(file), mesh_key_without_companions(file, content));
+                let (name, key) = (mesh_path_and_options(file), mesh_key_without_companions(file, content));
                 cache.insert(name, key, mesh.clone(), mesh.mesh.mesh.memory_bytes());
                 mesh
             }
@@ -135,9 +135,9 @@ pub(crate) fn load_meshes(
 }
 
 /// Canonical path of a mesh file, a part number, and the number of subdivision levels.
-pub(crate) type MeshIdentity = (PathBuf, Option<u32>, u32);
+pub(crate) type MeshPathAndOptions = (PathBuf, Option<u32>, u32);
 
-fn mesh_identity(file: &MeshFile) -> MeshIdentity {
+fn mesh_path_and_options(file: &MeshFile) -> MeshPathAndOptions {
     (canonical(&file.value), file.part, file.subdivide)
 }
 
@@ -262,7 +262,7 @@ mod tests {
         folder: tempfile::TempDir,
         sink: EventSink,
         pool: rayon::ThreadPool,
-        cache: CacheOfNamedValues<MeshIdentity, CachedMesh>,
+        cache: CacheOfNamedValues<MeshPathAndOptions, CachedMesh>,
         contents: Arc<FileHashCache>,
     }
 

@@ -8,7 +8,7 @@ use super::super::cache::Memo;
 use super::super::formats::foreign::{ForeignError, ForeignOptions};
 use super::super::formats::model::ModelViewOptions;
 use super::super::formats::{
-    ForeignFormat, ForeignReadContext, ForeignScene, foreign_file_error, scene_from_document,
+    ForeignFormat, ForeignReadContext, ForeignScene, not_a_scene_file_error, scene_from_document,
 };
 use super::super::protocol::{Failure, reasons};
 use super::super::watch::content::{FileContentId, FilePathAndContentId};
@@ -160,7 +160,7 @@ fn read_scene(
 ) -> Result<SceneAndDependencies, AbortReason> {
     let FileReadContext { contents, containers, token, .. } = *reading;
     let Some(format) = format else {
-        let foreign = foreign_file_error(path).map_or(Ok(()), |error| Err(vec![error]));
+        let foreign = not_a_scene_file_error(path).map_or(Ok(()), |error| Err(vec![error]));
         let loaded = foreign.and_then(|()| scene::load(path, sets)).map_err(|errors| {
             AbortReason::Failed(Failure::Scene(add_renamed_file_hint(errors, path, last)))
         })?;

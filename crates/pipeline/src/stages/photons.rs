@@ -149,7 +149,7 @@ impl PhotonStore {
     }
 
     /// Reports the photons traced since the stage started, and the cached maps.
-    pub(crate) fn report(&self) -> PhotonsReport {
+    pub(crate) fn to_photons_report(&self) -> PhotonsReport {
         let PhotonCounts { passes, emitted, stored, lookups, seconds, max_alive_bytes } = self.sent.get();
         let [caustic, bounced] = self.photons.first_pass_radii();
         PhotonsReport {
@@ -250,7 +250,7 @@ pub(crate) fn trace_first_photons(
     let watch = PausableStopwatch::start(token);
     let send = |progress: Progress<'_>| {
         run_with_ticks(pool, &mut tick, || {
-            PhotonPassTracer::new_with_first_pass(world, &settings, of_photons, progress, token)
+            PhotonPassTracer::new_and_trace_first_pass(world, &settings, of_photons, progress, token)
         })
     };
     let (photons, first) = sending.sink.load_asset_with_progress("photons", send)?;

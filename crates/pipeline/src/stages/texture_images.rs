@@ -17,12 +17,12 @@ use crate::control::Progress;
 use crate::materials::Mipmaps;
 use crate::materials::texels::Texels;
 use crate::scene::fingerprint::{Fingerprint, FingerprintHasher};
-use crate::world::{HashableAlphaCutoff, NeededTexture, TextureImageSource};
+use crate::world::{HashableAlphaCutoff, NeededTexture, TextureImageKey};
 
 /// Canonical path of an image, and how to interpret its values.
 pub(super) type TextureKey = (PathBuf, Option<u32>, ColorEncoding, Option<HashableAlphaCutoff>);
 
-pub(super) fn texture_key(source: &TextureImageSource) -> TextureKey {
+pub(super) fn texture_key(source: &TextureImageKey) -> TextureKey {
     (canonical(&source.path), source.image, source.encoding, source.coverage)
 }
 
@@ -78,11 +78,11 @@ impl ImageWithTextures<'_> {
 }
 
 /// Loads all images. Returns an error for each image that would raise the total size above `max_bytes`.
-pub(super) fn load_images_within_limit(
+pub(super) fn load_images_or_reject_excess(
     images: &[ImageWithTextures<'_>],
     max_bytes: u64,
     reading: &FileReadContext<'_>,
-) -> Vec<(TextureFileContentIds, Result<DecodedTextureWithMipmaps, AssetError>)> {
+) -> Vec<(TextureContentAndLinkedImage, Result<DecodedTextureWithMipmaps, AssetError>)> {
     let size = |image: &ImageWithTextures<'_>| {
         let (width, height, bytes) = match image.kept.texels.as_deref() {
             Some(DecodedTexture { texels, .. }) => {
@@ -133,7 +133,7 @@ fn memory_limit_errors(sizes: &[u64], max_bytes: u64) -> Vec<Option<String>> {
 }
 
 /// Content of a texture's file and, if that file is a glTF file, of the image file that it references.
-pub(super) type TextureFileContentIds = (FileContentId, Option<FilePathAndContentId>);
+pub(super) type TextureContentAndLinkedImage = (FileContentId, Option<FilePathAndContentId>);
 
 /// An image, its mipmaps if needed, and whether all of this came from the cache.
 pub(super) type DecodedTextureWithMipmaps = (Arc<DecodedTexture>, Option<Arc<Mipmaps>>, bool);
@@ -141,7 +141,7 @@ pub(super) type DecodedTextureWithMipmaps = (Arc<DecodedTexture>, Option<Arc<Mip
 /// Loads an image and its mipmaps. Sets `contents` to the contents that were decoded.
 fn load_image_and_mipmaps(
     image: &ImageWithTextures<'_>,
-    contents: &mut TextureFileContentIds,
+    contents: &mut TextureContentAndLinkedImage,
     reading: &FileReadContext<'_>,
 ) -> Result<DecodedTextureWithMipmaps, AssetError> {
     let mut was_kept = true;
@@ -172,7 +172,7 @@ fn load_image_and_mipmaps(
 /// Decodes an image. Sets `contents` to the contents that were decoded.
 fn decode_image(
     image: &ImageWithTextures<'_>,
-    contents: &mut TextureFileContentIds,
+    contents: &mut TextureContentAndLinkedImage,
     reading: &FileReadContext<'_>,
 ) -> Result<DecodedImage, AssetError> {
     let (one, limits) = (image.asked_by[0], ImageLimits::default());
@@ -215,7 +215,7 @@ fn decode_image(
 
 /// Returns where an image's bytes are stored.
 fn locate_image_bytes(
-    source: &TextureImageSource,
+    source: &TextureImageKey,
     reading: &FileReadContext<'_>,
 ) -> Result<ImageInput, AssetError> {
     match source.image {
@@ -231,7 +231,7 @@ fn locate_image_bytes(
 
 /// Returns the width, height and memory size of an image.
 fn image_dimensions_and_memory(
-    source: &TextureImageSource,
+    source: &TextureImageKey,
     reading: &FileReadContext<'_>,
 ) -> Result<(u32, u32, u64), AssetError> {
     let (limits, encoding) = (ImageLimits::default(), source.encoding);

@@ -11,7 +11,7 @@ use super::super::protocol::reasons;
 use super::super::watch::content::FilePathAndContentId;
 use super::meshes::MeshesByFileIndex;
 use super::texture_images::{
-    CachedTexelsAndMipmaps, DecodedTexture, ImageWithTextures, TextureKey, load_images_within_limit,
+    CachedTexelsAndMipmaps, DecodedTexture, ImageWithTextures, TextureKey, load_images_or_reject_excess,
     texture_key,
 };
 use super::texture_warnings::{
@@ -26,7 +26,7 @@ use crate::scene::LoadedScene;
 use crate::scene::description::TextureEncoding;
 use crate::scene::fingerprint::Fingerprint;
 use crate::world::{
-    Images, NeededTexture, TexelsAndMipmaps, TextureImageSource, TextureRolesNeededByRender,
+    Images, NeededTexture, TexelsAndMipmaps, TextureImageKey, TextureRolesNeededByRender,
     environment_map_source, textures_needed,
 };
 
@@ -45,7 +45,7 @@ pub(crate) struct TextureCache {
 impl TextureCache {
     /// Whether all of the given textures are cached, even if their files have changed in the meantime.
     fn has_all(&self, needed: &[NeededTexture]) -> bool {
-        needed.iter().all(|one| self.texels.get_by_name(&texture_key(&one.source)).is_some())
+        needed.iter().all(|one| self.texels.get_even_if_stale(&texture_key(&one.source)).is_some())
     }
 
     pub(crate) fn caches_mut(&mut self) -> [&mut dyn EvictableCache; 2] {
@@ -55,16 +55,16 @@ impl TextureCache {
     /// Forgets the linked files of images that are no longer cached.
     pub(crate) fn forget_links_of_evicted_images(&mut self) {
         let texels = &self.texels;
-        self.linked.retain(|name, _| texels.get_by_name(name).is_some());
+        self.linked.retain(|name, _| texels.get_even_if_stale(name).is_some());
     }
 }
 
 /// The loaded textures of a scene. Excludes textures that failed to load.
 #[derive(Debug, Default)]
-pub(crate) struct Textures {
+pub(crate) struct LoadedTextures {
     pub(crate) images: Images,
     /// Key of each image.
-    pub(crate) key_of: HashMap<TextureImageSource, Fingerprint>,
+    pub(crate) key_of: HashMap<TextureImageKey, Fingerprint>,
     /// Key of each texture, in the same order as the needed textures.
     pub(crate) keys: Vec<Fingerprint>,
     /// Keys of the textures used by materials from mesh files.
@@ -131,9 +131,9 @@ pub(crate) fn load_textures(
     cache: &mut TextureCache,
     findings: &mut Findings,
     reading: &FileReadContext<'_>,
-) -> Result<StageResult<Textures>, AbortReason> {
+) -> Result<StageResult<LoadedTextures>, AbortReason> {
     reading.add_generated_files(loaded, findings);
-    let mut textures = Textures::default();
+    let mut textures = LoadedTextures::default();
     let NeededTextures { textures: needed, left_out, are_required } = needed;
     if needed.is_empty() {
         let why = match left_out {
@@ -144,7 +144,7 @@ pub(crate) fn load_textures(
     }
     let environment = environment_map_source(&loaded.scene);
     let images = group_by_image(needed, cache, reading)?;
-    let assets = load_images_within_limit(&images, MAX_BYTES, reading);
+    let assets = load_images_or_reject_excess(&images, MAX_BYTES, reading);
     let mut counts = FileCounts::default();
     for (mut image, (contents, asset)) in images.into_iter().zip(assets) {
         (image.content, image.linked) = contents;
@@ -253,7 +253,7 @@ fn add_check_only_textures(loaded: &LoadedScene, wanted: &mut Vec<NeededTexture>
             TextureEncoding::Linear => ColorEncoding::Linear,
         };
         let (path, image) = (image.file.value.clone(), image.image);
-        let source = TextureImageSource { path, image, encoding, coverage: None };
+        let source = TextureImageKey { path, image, encoding, coverage: None };
         wanted.push(NeededTexture {
             source,
             name: texture.name.clone(),

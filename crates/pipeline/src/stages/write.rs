@@ -21,7 +21,7 @@ use crate::control::CancelToken;
 use crate::film::tone::tone_map_to_8_bits;
 use crate::film::{RadianceImage, Rect, SampleCountStats, Srgb8Image};
 use crate::integrators::{AovSource, PathAov, RenderSettings};
-use crate::output::part::{self, PartHeader, PartOrCheckpoint};
+use crate::output::part::{self, PartFileKind, PartHeader};
 use crate::output::write::{Durability, ExistingFilePolicy, SweptFolders};
 use crate::output::{self, BitDepth, FilmEncodingSettings, Format, OutputError, scene_path};
 use crate::output::{AnimationFormat, animation};
@@ -56,7 +56,7 @@ impl WriteState {
 
     /// Allows the scene's own image to replace any other image if the scene has been saved since the last
     /// call.
-    pub(crate) fn record_scene_save_count(&mut self, saves: u64) {
+    pub(crate) fn allow_replacing_if_scene_saved(&mut self, saves: u64) {
         if std::mem::replace(&mut self.saves, saves) != saves {
             self.is_by_hand = false;
         }
@@ -87,7 +87,7 @@ pub(crate) fn check_outputs_are_writable(
     match writing {
         WriteRequirement::No => Ok(()),
         WriteRequirement::Must => {
-            check_each_target_is_writable(plan, output::check_image_target, output::check_output_path)
+            check_each_target_is_writable(plan, output::check_image_target, output::check_output_is_writable)
                 .map_err(AbortReason::from_work_error)
         }
         WriteRequirement::Try => {
@@ -191,7 +191,7 @@ fn write_outdated_outputs(
                 // programs, which may change the file.
                 let content = contents.read_content_id(path, &CancelToken::new())?;
                 contents.outputs.end_write(path, Some(content));
-                contents.outputs.set_image(path, key);
+                contents.outputs.record_image_key(path, key);
                 written.is_by_hand = !is_own;
                 sink.send_image_written(path, bytes, is_own, unfinished);
             }
@@ -236,7 +236,7 @@ pub(crate) fn write_on_request(
         to.sink.send_write_conflicts(conflicts);
         return false;
     }
-    to.contents.outputs.forget_images();
+    to.contents.outputs.mark_images_outdated();
     written.own = None;
     // Use a token that is never canceled, because the user requested the image.
     let outcome = write_outdated_outputs(state, to, written, &CancelToken::new(), false);
@@ -330,7 +330,7 @@ fn write_part(
     let identity = state.identity.clone().unwrap_or_default();
     let scene = scene_path::relative_to_image(&plan.path, path);
     let references = inputs.paths_relative_to_scene(&plan.path);
-    let head = create_header(PartOrCheckpoint::Part, state, identity, &image_encoding_settings(plan));
+    let head = create_header(PartFileKind::Part, state, identity, &image_encoding_settings(plan));
     let head = PartHeader { scene, references, ..head };
     let save = |guard: &ExistingFilePolicy<'_>| {
         part::save(path, &head, &state.film, &Value::Null, guard, token, Durability::Power).map(drop)

@@ -3,7 +3,7 @@
 use super::*;
 use crate::math::DVec3;
 use crate::messages;
-use crate::protocol::{CameraSaveResult, MovedCamera, NormalizedPosition, PickedPixel, SavedCameraEdit};
+use crate::protocol::{CameraSaveResult, NormalizedPosition, PickedPixel, SavedCameraEdit, UserMovedCamera};
 use crate::scene::description::{CameraOverrides, ImageShiftAndMirror, Pose, Projection, ResolvedCamera};
 
 /// Tables that add a mirror and photons to a scene.
@@ -111,7 +111,7 @@ fn keep_moved_from(
     camera: ResolvedCamera,
     own: ResolvedCamera,
 ) -> Result<CameraSaveResult, String> {
-    match answer(bench, Command::KeepCamera(Box::new(MovedCamera { camera, own }))) {
+    match answer(bench, Command::KeepCamera(Box::new(UserMovedCamera { camera, own }))) {
         Event::CameraKept { outcome, .. } => outcome,
         other => panic!("{other:?}"),
     }

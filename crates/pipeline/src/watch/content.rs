@@ -164,7 +164,7 @@ impl FilesSeenByRequest {
     ///
     /// # Errors
     /// Returns [`Canceled`] if the token is canceled.
-    pub(crate) fn recheck_seen_files(&self, token: &CancelToken) -> Result<(), Canceled> {
+    pub(crate) fn record_changes_to_seen_files(&self, token: &CancelToken) -> Result<(), Canceled> {
         let seen: Vec<_> = self.lock_seen_files().iter().map(|(path, seen)| (path.clone(), *seen)).collect();
         for (path, FirstSeenFile { content, stamp }) in seen {
             let Some(now) = FileStamp::from_path(&path) else { continue };
@@ -180,7 +180,7 @@ impl FilesSeenByRequest {
     }
 
     /// Waits until no file has changed for [`SETTLE_TIME`], or until about that much time has passed. As a
-    /// result, [`Self::recheck_seen_files`] also detects a program that is still writing.
+    /// result, [`Self::record_changes_to_seen_files`] also detects a program that is still writing.
     ///
     /// # Errors
     /// Returns [`Canceled`] if the token is canceled.
@@ -244,7 +244,7 @@ impl FileHashCache {
     pub fn read_content_id(&self, path: &Path, token: &CancelToken) -> Result<FileContentId, Canceled> {
         token.check_pause_and_cancel()?;
         let now = SystemTime::now();
-        let metadata = match file::file_kind(path) {
+        let metadata = match file::file_kind_and_metadata(path) {
             Ok((FileKind::Regular, metadata)) => metadata,
             Ok((FileKind::Folder, _)) => return Ok(FileContentId::Unusable(UnreadableReason::Folder)),
             Ok((FileKind::Special, _)) => return Ok(FileContentId::Unusable(UnreadableReason::Special)),
@@ -407,7 +407,7 @@ mod tests {
             ["mesh", "texture", "library", "same"].map(|name| current.join(name));
         let hash_of = |path: &Path| *blake3::hash(&fs::read(path).expect("read")).as_bytes();
         let verified = |snapshot: &FilesSeenByRequest| {
-            snapshot.recheck_seen_files(&token).expect("not canceled");
+            snapshot.record_changes_to_seen_files(&token).expect("not canceled");
             snapshot.changed_file()
         };
         for is_decoded in [false, true] {
@@ -450,7 +450,7 @@ mod tests {
                 snapshot.begun += Duration::from_secs(4);
             }
             snapshot.record_decoded_with_stamp(&path, old, stamp);
-            snapshot.recheck_seen_files(&token).expect("not canceled");
+            snapshot.record_changes_to_seen_files(&token).expect("not canceled");
             // A file with a settled stamp is not read again.
             assert_eq!(snapshot.changed_file(), (!is_settled).then(|| path.clone()));
         }

@@ -113,7 +113,7 @@ impl WrittenOutputs {
     }
 
     /// Records which image a written file contains.
-    pub(crate) fn set_image(&self, path: &Path, key: Fingerprint) {
+    pub(crate) fn record_image_key(&self, path: &Path, key: Fingerprint) {
         if let Some(output) = self.lock().get_mut(path) {
             output.image = Some(key);
         }
@@ -125,7 +125,7 @@ impl WrittenOutputs {
     }
 
     /// Forgets which images the files contain, so that the next write stage writes them again.
-    pub(crate) fn forget_images(&self) {
+    pub(crate) fn mark_images_outdated(&self) {
         self.lock().values_mut().for_each(|output| output.image = None);
     }
 

@@ -93,7 +93,7 @@ impl KeyDifferences<'_> {
         let is_same = |(a, b): &(&Value<'_>, &Value<'_>)| is_equal_value(a, b);
         let start = old.iter().zip(&new).take_while(is_same).count();
         let end = old.iter().rev().zip(new.iter().rev()).take(least - start).take_while(is_same).count();
-        let (old_names, new_names) = (key_parts_of_list_elements(&old), key_parts_of_list_elements(&new));
+        let (old_names, new_names) = (element_names_or_numbers(&old), element_names_or_numbers(&new));
         let changed = |all: &[Value<'_>]| start..all.len() - end;
         for (index, old) in changed(&old).zip(&old[changed(&old)]) {
             if let Some(after) = new[changed(&new)].get(index - start) {
@@ -114,7 +114,7 @@ impl KeyDifferences<'_> {
         match value.decode() {
             TomlValue::Array(array) if array.starts_with_table() => {
                 let all: Vec<Value<'_>> = array.iter().collect();
-                for (element, value) in key_parts_of_list_elements(&all).iter().zip(&all) {
+                for (element, value) in element_names_or_numbers(&all).iter().zip(&all) {
                     self.add_unmatched_entry(sign, &join_key(name, element), value, text);
                 }
             }
@@ -160,7 +160,7 @@ fn join_key(name: &str, key: &str) -> String {
 
 /// Returns the key part with which `--set` addresses each element of a list: the element's name if it is
 /// unique, and otherwise its 1-based position.
-fn key_parts_of_list_elements(all: &[Value<'_>]) -> Vec<String> {
+fn element_names_or_numbers(all: &[Value<'_>]) -> Vec<String> {
     let mut counts: HashMap<&str, usize> = HashMap::new();
     for name in all.iter().filter_map(value_of_name_key) {
         *counts.entry(name).or_default() += 1;

@@ -72,7 +72,7 @@ impl Projection {
     }
 
     /// Whether the camera has a lens, which can be out of focus.
-    pub fn has_lens(self) -> bool {
+    pub fn supports_depth_of_field(self) -> bool {
         match self {
             Self::Perspective { .. } | Self::Orthographic { .. } => true,
             Self::Spherical | Self::Fisheye { .. } => false,

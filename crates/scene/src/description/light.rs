@@ -6,8 +6,8 @@ use super::super::fingerprint::{FingerprintContext, FingerprintHasher, Fingerpri
 use super::Spanned;
 use crate::lights;
 pub use crate::lights::delta::Falloff;
-pub use crate::lights::infinite::MapRows;
-use crate::lights::infinite::sky::{SkyParameters, elevation};
+pub use crate::lights::infinite::MapRowPlacement;
+use crate::lights::infinite::sky::{SkyModelInputs, elevation};
 use crate::math::transform::rotation_xyz;
 use crate::math::{DMat3, DVec3, Vec3};
 
@@ -69,7 +69,7 @@ pub struct Environment {
     /// Orientation of the map or the sky.
     pub orientation: MapOrientation,
     /// Polar angles of the map's rows.
-    pub rows: MapRows,
+    pub rows: MapRowPlacement,
 }
 
 /// Orientation of an environment map or a sky.
@@ -179,9 +179,9 @@ impl Environment {
 
 impl Sky {
     /// The parameters of the model.
-    pub fn parameters(&self) -> SkyParameters {
+    pub fn parameters(&self) -> SkyModelInputs {
         let Self { sun, turbidity, ground, sun_angle, sun_scale, sky_scale, ground_scale } = *self;
-        SkyParameters {
+        SkyModelInputs {
             sun_elevation: elevation(sun),
             turbidity,
             ground,

@@ -56,7 +56,7 @@ impl MaterialKind {
             | Self::Plastic { roughness, .. }
             | Self::Glass { roughness, .. } => *roughness == NumberSource::Constant(0.0),
             Self::Mirror { .. } | Self::Pane { .. } => true,
-            Self::Blend { .. } => self.is_any_part(|part| part.kind.has_delta_lobe()),
+            Self::Blend { .. } => self.any_blend_part_is(|part| part.kind.has_delta_lobe()),
         }
     }
 
@@ -75,7 +75,7 @@ impl MaterialKind {
     }
 
     /// Whether a property holds for any part of a blend.
-    fn is_any_part(&self, property: impl Fn(&Material) -> bool) -> bool {
+    fn any_blend_part_is(&self, property: impl Fn(&Material) -> bool) -> bool {
         self.blend_parts().iter().any(property)
     }
 
@@ -104,7 +104,7 @@ impl MaterialKind {
             | Self::Pane { .. }
             | Self::Plastic { .. }
             | Self::Principled { .. } => false,
-            Self::Blend { .. } => self.is_any_part(|part| part.kind.is_anisotropic()),
+            Self::Blend { .. } => self.any_blend_part_is(|part| part.kind.is_anisotropic()),
         }
     }
 
@@ -118,7 +118,7 @@ impl MaterialKind {
             | Self::Pane { .. }
             | Self::Plastic { .. }
             | Self::Principled { .. } => true,
-            Self::Blend { .. } => self.is_any_part(|part| part.kind.accepts_vertex_colors()),
+            Self::Blend { .. } => self.any_blend_part_is(|part| part.kind.accepts_vertex_colors()),
         }
     }
 
@@ -133,7 +133,7 @@ impl MaterialKind {
                 *diffuse_transmission != ColorSource::BLACK
             }
             Self::Mirror { .. } | Self::Metal { .. } | Self::Plastic { .. } => false,
-            Self::Blend { .. } => self.is_any_part(|part| part.kind.transmits()),
+            Self::Blend { .. } => self.any_blend_part_is(|part| part.kind.transmits()),
         }
     }
 
@@ -259,13 +259,13 @@ pub enum MaterialKind {
 impl Material {
     /// Whether shapes with this material are lights.
     pub fn emits(&self) -> bool {
-        self.emission.scale != Vec3::ZERO || self.kind.is_any_part(Self::emits)
+        self.emission.scale != Vec3::ZERO || self.kind.any_blend_part_is(Self::emits)
     }
 
     /// The sides of the surface that may emit light.
     pub fn emission_sides(&self) -> EmissionSides {
         let is_both = |part: &Self| part.emits() && part.emission_sides() == EmissionSides::Both;
-        if self.kind.is_any_part(is_both) { EmissionSides::Both } else { self.emission.sides }
+        if self.kind.any_blend_part_is(is_both) { EmissionSides::Both } else { self.emission.sides }
     }
 
     /// The material itself and, for a blend, all of its parts.

@@ -20,7 +20,7 @@ pub use camera::{
     Camera, CameraOverrides, ImageShiftAndMirror, Pose, Projection, ProjectionKind, ResolvedCamera,
     is_same_distance,
 };
-pub use light::{Environment, Light, MapOrientation, MapRows, Sky};
+pub use light::{Environment, Light, MapOrientation, MapRowPlacement, Sky};
 pub use material::{
     Bump, Channel, ChannelSelector, CoatSource, ColorSource, ConductorFresnelSource, EmissionSides,
     EmissionSource, Material, MaterialKind, MicrofacetDistribution, NormalMap, NumberSource, OpacitySource,
@@ -30,7 +30,7 @@ pub use method::{Integrator, IntegratorProperties};
 pub use render::{Accel, MAX_BOUNCES, PixelFilter, RenderOptions, ShadowMode, Tonemap, render_keys};
 pub use shape::{LoweredShape, MeshReference, Object, OpenSurface, Shape, max_projection};
 pub use texture::{
-    ImageSource, Pattern, Texture, TextureContent, TextureEncoding, TextureFilter, UvSet, Wrap,
+    ImageSource, Pattern, Texture, TextureEncoding, TextureFilter, TextureSource, UvSet, Wrap,
 };
 pub use transform::{AffineMap, ObjectTransform};
 
@@ -74,7 +74,7 @@ pub struct Instance {
 
 impl Scene {
     /// Returns the instance that contains an object, or `None` if the object is not in a group.
-    pub fn instance_of(&self, object: usize) -> Option<&Instance> {
+    pub fn instance_containing(&self, object: usize) -> Option<&Instance> {
         let index = self.instances.partition_point(|instance| instance.objects.end <= object);
         self.instances.get(index).filter(|instance| instance.objects.contains(&object))
     }

@@ -21,12 +21,12 @@ pub struct Texture {
     /// Scale factor for linear colors and numbers. Normals and heights ignore it.
     pub factor: Vec3,
     /// The image or the pattern.
-    pub content: TextureContent,
+    pub content: TextureSource,
 }
 
 /// The source of a texture's values.
 #[derive(Clone, Debug, PartialEq)]
-pub enum TextureContent {
+pub enum TextureSource {
     /// An image.
     Image(ImageSource),
     /// Two colors, mixed by a pattern.
@@ -75,16 +75,16 @@ impl Texture {
     /// Returns the image, or `None` for a pattern.
     pub fn as_image(&self) -> Option<&ImageSource> {
         match &self.content {
-            TextureContent::Image(image) => Some(image),
-            TextureContent::Pattern { .. } => None,
+            TextureSource::Image(image) => Some(image),
+            TextureSource::Pattern { .. } => None,
         }
     }
 
     /// Returns the image, or `None` for a pattern.
     pub fn as_image_mut(&mut self) -> Option<&mut ImageSource> {
         match &mut self.content {
-            TextureContent::Image(image) => Some(image),
-            TextureContent::Pattern { .. } => None,
+            TextureSource::Image(image) => Some(image),
+            TextureSource::Pattern { .. } => None,
         }
     }
 
@@ -92,8 +92,8 @@ impl Texture {
     /// coordinates.
     pub fn uv_set(&self) -> Option<UvSet> {
         match &self.content {
-            TextureContent::Image(image) => Some(image.uv),
-            TextureContent::Pattern { pattern, .. } => pattern.mapping().map(TextureMapping::uv_set),
+            TextureSource::Image(image) => Some(image.uv),
+            TextureSource::Pattern { pattern, .. } => pattern.mapping().map(TextureMapping::uv_set),
         }
     }
 }
@@ -104,16 +104,7 @@ impl Fingerprinted for Texture {
         let Self { name: _, filter, factor, content } = self;
         key.add_choice_name(*filter).add_vec3(*factor);
         match content {
-            TextureContent::Image(ImageSource {
-                file,
-                image,
-                wrap,
-                repeat,
-                rotate,
-                offset,
-                uv,
-                encoding,
-            }) => {
+            TextureSource::Image(ImageSource { file, image, wrap, repeat, rotate, offset, uv, encoding }) => {
                 key.add_path_bytes(&file.value)
                     .add_choice_name(*wrap)
                     .add_choice_name(*encoding)
@@ -122,7 +113,7 @@ impl Fingerprinted for Texture {
                 key.add_f64(*rotate).add_f32(offset.x).add_f32(offset.y).add_bool(*uv == UvSet::Second);
                 key.add_usize(image.map_or(0, |image| image as usize + 1));
             }
-            TextureContent::Pattern { colors, pattern } => {
+            TextureSource::Pattern { colors, pattern } => {
                 // The debug form has all parameters, and its numbers are exact.
                 key.add_vec3(colors[0]).add_vec3(colors[1]).add_str(&format!("{pattern:?}"));
             }

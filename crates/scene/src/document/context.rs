@@ -110,7 +110,7 @@ impl<'a> FileContext<'a> {
     }
 
     /// Whether a file exists only in memory.
-    pub(super) fn is_generated_file(&self, name: &str) -> bool {
+    pub(super) fn is_in_memory_file(&self, name: &str) -> bool {
         self.generated.contains_key(name)
     }
 

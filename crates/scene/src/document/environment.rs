@@ -1,6 +1,6 @@
 //! The `[environment]` table.
 
-use super::super::description::{Environment, MapOrientation, MapRows, Scene, Sky};
+use super::super::description::{Environment, MapOrientation, MapRowPlacement, Scene, Sky};
 use super::super::keys::endings::MAPS;
 use super::super::keys::key::DefaultValue::{Absent, By, Is, Required};
 use super::super::keys::key::ValueKind::{Color, File, InlineTable, Number, Rotation, Words};
@@ -23,7 +23,7 @@ pub(crate) static ENVIRONMENT: TableInfo = TableInfo::new(
         file: File(MAPS), Absent;
         /// Polar angles of the map's rows: `"centers"`, or `"poles"` if the first and the last row are at the
         /// poles, as in Mitsuba.
-        rows: Words(choice_values::<MapRows>), Is("\"centers\"");
+        rows: Words(choice_values::<MapRowPlacement>), Is("\"centers\"");
         /// A clear sky with a sun.
         sky: InlineTable(SKY), Absent;
         /// Rotation of the map or the sky about +y, counterclockwise seen from above.
@@ -71,7 +71,7 @@ pub(super) fn read_environment(root: &TableReader<'_>) -> Option<Option<Environm
     } else {
         rotate.number().map(MapOrientation::Turn)
     };
-    let rows = table.key("rows").choice::<MapRows>();
+    let rows = table.key("rows").choice::<MapRowPlacement>();
     table.report_unknown_and_missing_keys();
     if let (Some(Vec3::ZERO), Some(span)) = (radiance, color.value_span().filter(|_| file.is_present())) {
         let issue = Issue::warning(span, "`color` is black, so the environment is black")

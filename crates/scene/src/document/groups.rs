@@ -20,7 +20,7 @@ use super::table::TableReader;
 use super::transform::{composed_transform_problem, read_transform};
 
 pub(crate) static GROUPS: TableInfo = TableInfo {
-    tables: object_table_definitions,
+    tables: object_table_infos,
     ..TableInfo::new(
         "groups",
         TableSyntax::Named,
@@ -51,7 +51,7 @@ pub(crate) static INSTANCE: TableInfo = TableInfo::new(
 );
 
 /// Returns the tables of objects, which can be in a scene or in a group.
-pub(crate) fn object_table_definitions() -> &'static [TableInfo] {
+pub(crate) fn object_table_infos() -> &'static [TableInfo] {
     static TABLES: LazyLock<Vec<TableInfo>> =
         LazyLock::new(|| SHAPES.iter().map(|shape| &shape.info).chain([&INSTANCE]).cloned().collect());
     &TABLES
@@ -158,13 +158,13 @@ fn expanded_sizes(
     // Visit nested groups first. Use Kahn's algorithm, because recursion could overflow the stack.
     let mut sizes = vec![0_u64; groups.len()];
     let mut parents: Vec<Vec<usize>> = vec![Vec::new(); groups.len()];
-    let mut pending: Vec<usize> = groups.iter().map(|group| nested_instances(group).count()).collect();
+    let mut pending: Vec<usize> = groups.iter().map(|group| instances_in_group(group).count()).collect();
     for (parent, group) in groups.iter().enumerate() {
-        nested_instances(group).for_each(|instance| parents[instance.group].push(parent));
+        instances_in_group(group).for_each(|instance| parents[instance.group].push(parent));
     }
     let mut ready: Vec<usize> = (0..groups.len()).filter(|&group| pending[group] == 0).collect();
     while let Some(group) = ready.pop() {
-        let nested = nested_instances(&groups[group]).map(|instance| sizes[instance.group]);
+        let nested = instances_in_group(&groups[group]).map(|instance| sizes[instance.group]);
         sizes[group] = nested.fold(groups[group].len() as u64, u64::saturating_add);
         for &parent in &parents[group] {
             pending[parent] -= 1;
@@ -177,13 +177,13 @@ fn expanded_sizes(
     let Some(start) = pending.iter().position(|&count| count > 0) else { return Some(sizes) };
     let is_pending = |instance: &&InstanceTable| pending[instance.group] > 0;
     let next: Vec<Option<&InstanceTable>> =
-        groups.iter().map(|group| nested_instances(group).find(is_pending)).collect();
+        groups.iter().map(|group| instances_in_group(group).find(is_pending)).collect();
     report_cycle(context, names, &next, start);
     None
 }
 
 /// Returns the instances in a group.
-fn nested_instances(group: &[GroupMember]) -> impl Iterator<Item = &InstanceTable> {
+fn instances_in_group(group: &[GroupMember]) -> impl Iterator<Item = &InstanceTable> {
     group.iter().filter_map(|member| match member {
         GroupMember::Object(_) => None,
         GroupMember::Instance(instance) => Some(instance),

@@ -273,7 +273,7 @@ impl<'a> MaterialReader<'a> {
     }
 
     /// Reads a number that cannot be a texture.
-    fn constant(&self, name: &str) -> f32 {
+    fn untextured_number(&self, name: &str) -> f32 {
         self.key(name).read_or_default(KeyInTable::number_f32)
     }
 
@@ -292,13 +292,13 @@ impl<'a> MaterialReader<'a> {
             diffuse: diffuse.unwrap_or_else(|| diffuse_key.default(color)),
             specular: specular.unwrap_or_else(|| specular_key.default(color)),
             diffuse_transmission: transmission.unwrap_or_else(|| transmission_key.default(color)),
-            shininess: self.constant("shininess"),
+            shininess: self.untextured_number("shininess"),
             ambient: color(ambient_key),
         }
     }
 
     fn read_glass(&self) -> Option<MaterialKind> {
-        let ior = self.constant("ior");
+        let ior = self.untextured_number("ior");
         let (tint, thin) = (self.key("tint"), self.key("thin"));
         let roughness = self.number("roughness");
         let distribution = self.read_distribution(roughness);
@@ -374,7 +374,7 @@ impl<'a> MaterialReader<'a> {
         MaterialKind::Plastic {
             diffuse: self.color_or_texture("diffuse"),
             specular: self.color_or_texture("specular"),
-            ior: self.constant("ior"),
+            ior: self.untextured_number("ior"),
             roughness,
             distribution: self.read_distribution(roughness),
             nonlinear: self.key("nonlinear").boolean().unwrap_or(true),
@@ -392,7 +392,7 @@ impl<'a> MaterialReader<'a> {
             diffuse_transmission,
             metallic: self.number("metallic"),
             roughness: self.number("roughness"),
-            ior: self.constant("ior"),
+            ior: self.untextured_number("ior"),
             specular: self.number("specular"),
             specular_color: self.color_or_texture("specular_color"),
             transmission: self.number("transmission"),

@@ -69,7 +69,7 @@ pub(super) fn read_render_table(root: &TableReader<'_>) -> (Option<RenderOptions
 fn read_output_path(table: &TableReader<'_>) -> Option<PathBuf> {
     let key = table.key("output");
     let text = key.string("an image path, such as \"image.png\"")?;
-    key.check_extension(text, key.extensions()).then(|| table.context.resolve_path(text))
+    key.check_extension(text, key.allowed_file_extensions()).then(|| table.context.resolve_path(text))
 }
 
 fn check_image_size(table: &TableReader<'_>, render: &RenderOptions) {

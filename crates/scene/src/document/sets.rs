@@ -5,24 +5,24 @@ use super::super::keys::key::TableSyntax;
 use super::super::nearest::nearest_name;
 use super::super::sanitize::escape_and_truncate;
 use super::super::source::SceneText;
-use super::super::toml::{Document, KeyError, KeyErrorKind, KnownTableKinds, apply_assignment};
+use super::super::toml::{Document, KeyError, KeyErrorKind, TableKindPredicates, apply_assignment};
 use super::context::{FileContext, Issue};
 
 /// The scene keys that are groups of named tables or lists of tables.
-const LAYOUT: KnownTableKinds = KnownTableKinds {
-    is_group: |name| is_table_with_syntax(name, TableSyntax::Named),
+const LAYOUT: TableKindPredicates = TableKindPredicates {
+    is_group: |name| is_known_table_of_form(name, TableSyntax::Named),
     is_list: is_table_list_path,
 };
 
 fn is_table_list_path(path: &[&str]) -> bool {
     match path {
-        [name] => is_table_with_syntax(name, TableSyntax::List),
+        [name] => is_known_table_of_form(name, TableSyntax::List),
         [group, _, name] => find_table(group).is_some_and(|info| info.find_inner_table(name).is_some()),
         _ => false,
     }
 }
 
-fn is_table_with_syntax(name: &str, form: TableSyntax) -> bool {
+fn is_known_table_of_form(name: &str, form: TableSyntax) -> bool {
     find_table(name).is_some_and(|info| info.form == form)
 }
 

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use super::super::description::{
     Channel, ChannelSelector, ImageSource, Material, Pattern, PixelInterpretation, Spanned, Texture,
-    TextureContent, TextureEncoding, TextureFilter, UvSet, Wrap,
+    TextureEncoding, TextureFilter, TextureSource, UvSet, Wrap,
 };
 use super::super::keys::endings::{self, GLTF, MAPS};
 use super::super::keys::key::DefaultValue::{Absent, Is, Required};
@@ -129,7 +129,7 @@ fn read_texture(name: String, mut table: TableReader<'_>) -> Option<Texture> {
     let kind = table.read_type()?;
     let table = &table;
     let content = match kind {
-        TextureType::Image => read_image(table).map(TextureContent::Image),
+        TextureType::Image => read_image(table).map(TextureSource::Image),
         TextureType::Checker => {
             read_pattern(table, || Some(Pattern::Checker(Checker { mapping: read_mapping(table) })))
         }
@@ -153,9 +153,9 @@ fn read_image(table: &TableReader<'_>) -> Option<ImageSource> {
 }
 
 /// Reads a pattern and its colors.
-fn read_pattern(table: &TableReader<'_>, read: impl FnOnce() -> Option<Pattern>) -> Option<TextureContent> {
+fn read_pattern(table: &TableReader<'_>, read: impl FnOnce() -> Option<Pattern>) -> Option<TextureSource> {
     let (colors, pattern) = (table.key("colors").color_pair(), read());
-    Some(TextureContent::Pattern { colors: colors?, pattern: pattern? })
+    Some(TextureSource::Pattern { colors: colors?, pattern: pattern? })
 }
 
 fn read_noise(table: &TableReader<'_>) -> Option<Noise> {

@@ -13,7 +13,7 @@ use std::sync::LazyLock;
 
 use super::document::camera::CAMERA;
 use super::document::environment::ENVIRONMENT;
-use super::document::groups::{GROUPS, object_table_definitions};
+use super::document::groups::{GROUPS, object_table_infos};
 use super::document::lights::LIGHT;
 use super::document::materials::MATERIALS;
 use super::document::photons::PHOTONS;
@@ -30,7 +30,7 @@ pub fn all_tables() -> &'static [TableInfo] {
     static TABLES: LazyLock<Vec<TableInfo>> = LazyLock::new(|| {
         let before = [&RENDER, &CAMERA, &PHOTONS, &TEXTURES, &MATERIALS];
         let after = [&GROUPS, &LIGHT, &ENVIRONMENT];
-        before.into_iter().chain(object_table_definitions()).chain(after).cloned().collect()
+        before.into_iter().chain(object_table_infos()).chain(after).cloned().collect()
     });
     &TABLES
 }

@@ -40,12 +40,12 @@ pub fn report_lines(diagnostics: &[Diagnostic], width: usize) -> Vec<ReportLine>
         .warning(AnsiColor::Yellow.on_default())
         .line_num(AnsiColor::Blue.on_default())
         .emphasis(Effects::BOLD.into());
-    render_diagnostics_with_renderer(diagnostics, width, &renderer).lines().map(split_styled_spans).collect()
+    render_diagnostics_with_renderer(diagnostics, width, &renderer).lines().map(parse_styled_spans).collect()
 }
 
 /// Splits a line at color escape sequences, all of which come from the renderer because text from files is
 /// sanitized.
-fn split_styled_spans(line: &str) -> ReportLine {
+fn parse_styled_spans(line: &str) -> ReportLine {
     let mut pieces = ReportLine::new();
     let mut role = ReportTextRole::Text;
     for (number, part) in line.split("\u{1b}[").enumerate() {

@@ -118,7 +118,7 @@ impl SceneDocumentBuilder {
     }
 
     /// Creates an empty document for a foreign scene that consists of several text files.
-    pub fn from_files(files: SourceFiles) -> Self {
+    pub fn empty_for_source_files(files: SourceFiles) -> Self {
         let (source, files) = files.into_parts();
         Self { files, ..Self::new(source) }
     }
@@ -135,7 +135,7 @@ impl SceneDocumentBuilder {
 
     /// Sets the files of a foreign scene that consists of several text files. All spans, including those of
     /// values added before, index into their concatenated texts.
-    pub fn attach_files(&mut self, files: SourceFiles) {
+    pub fn set_source_files(&mut self, files: SourceFiles) {
         (self.source, self.files) = files.into_parts();
     }
 
@@ -151,7 +151,7 @@ impl SceneDocumentBuilder {
     }
 
     /// Adds a comment below the header of the current table.
-    pub fn add_table_comment(&mut self, text: impl Into<String>) {
+    pub fn add_comment_below_header(&mut self, text: impl Into<String>) {
         self.comments.push(Comment { table: self.table, is_below_header: true, text: text.into() });
     }
 
@@ -168,10 +168,10 @@ impl SceneDocumentBuilder {
 
     /// Starts a table `[[list]]`.
     pub fn start_list_table(&mut self, list: &'static str) {
-        self.list_table_in(Document::ROOT, list);
+        self.start_list_table_in(Document::ROOT, list);
     }
 
-    fn list_table_in(&mut self, parent: TableId, list: &'static str) {
+    fn start_list_table_in(&mut self, parent: TableId, list: &'static str) {
         let found = self.document.find_in_table(parent, list).map(|found| found.kind);
         let kind = found.unwrap_or_else(|| {
             let kind = self.document.add_table_list();
@@ -186,15 +186,15 @@ impl SceneDocumentBuilder {
     }
 
     /// Starts a table `[[groups.group.list]]`.
-    pub fn group_list_table(&mut self, group: &str, list: &'static str) {
+    pub fn start_group_list_table(&mut self, group: &str, list: &'static str) {
         self.start_named_table("groups", group);
         let parent = self.table;
-        self.list_table_in(parent, list);
+        self.start_list_table_in(parent, list);
     }
 
     /// Adds a key, which must be new, to the current table.
     pub fn set(&mut self, key: &'static str, value: impl Into<BuiltValue>) {
-        let kind = self.add_value(value.into());
+        let kind = self.add_value_node(value.into());
         self.add_entry(self.table, key.into(), kind);
     }
 
@@ -217,7 +217,7 @@ impl SceneDocumentBuilder {
         self.document.add_entry(table, name, ValueNode { span: self.span, kind });
     }
 
-    fn add_value(&mut self, value: BuiltValue) -> NodeKind {
+    fn add_value_node(&mut self, value: BuiltValue) -> NodeKind {
         match value {
             // Files contain 0 instead of -0.
             BuiltValue::Number(number) => self.document.add_number(number + 0.0),
@@ -227,7 +227,7 @@ impl SceneDocumentBuilder {
             BuiltValue::Flag(flag) => NodeKind::Boolean(flag),
             BuiltValue::Array(values) => {
                 let span = self.span;
-                let node = |value| ValueNode { span, kind: self.add_value(value) };
+                let node = |value| ValueNode { span, kind: self.add_value_node(value) };
                 let elements: Vec<ValueNode> = values.into_iter().map(node).collect();
                 self.document.add_array(&elements)
             }
@@ -235,7 +235,7 @@ impl SceneDocumentBuilder {
                 let table =
                     self.document.add_table(TableOrigin { is_inline: true, ..TableOrigin::default() });
                 for (key, value) in entries {
-                    let kind = self.add_value(value);
+                    let kind = self.add_value_node(value);
                     self.add_entry(table, key.into(), kind);
                 }
                 NodeKind::Table(table)
@@ -257,7 +257,7 @@ mod tests {
         built.set("samples", 256.0);
         built.add_comment_above_next_table("All lights.");
         built.start_list_table("light");
-        built.add_table_comment("sun");
+        built.add_comment_below_header("sun");
         built.set("type", "directional");
         built.set("direction", DVec3::new(0.0, -1.0, -0.0));
         for (texture, material) in [("a", "wall"), ("b", "old floor")] {

@@ -40,7 +40,7 @@ pub use write::quote_toml_string;
 
 pub(super) use brackets::{BracketToken, find_all_array_brackets, innermost_bracket_open_at_end};
 pub(super) use error::SyntaxError;
-pub(super) use set::{KeyError, KeyErrorKind, KnownTableKinds};
+pub(super) use set::{KeyError, KeyErrorKind, TableKindPredicates};
 pub(super) use tree::{Document, Elements, Entries, KeyValue, Number, TableId, TomlValue, Value};
 pub(super) use write::{format_value, quote_key_part};
 
@@ -74,7 +74,7 @@ pub(super) fn apply_assignment<'s>(
     document: Document<'s>,
     source: &'s str,
     at: usize,
-    layout: KnownTableKinds,
+    layout: TableKindPredicates,
 ) -> (Document<'s>, Result<(), KeyError>) {
     let (mut assembly, detached) =
         DocumentBuilder::from_document_with_new_table(document.with_extended_source(source));

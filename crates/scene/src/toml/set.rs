@@ -43,7 +43,7 @@ pub(crate) enum KeyErrorKind {
 
 /// The groups and lists of tables in a document.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct KnownTableKinds {
+pub(crate) struct TableKindPredicates {
     /// Whether a top-level name denotes a group of named tables. Named tables are never created.
     pub(crate) is_group: fn(&str) -> bool,
     /// Whether the parts of a key denote a list of tables.
@@ -56,7 +56,7 @@ impl<'s> Document<'s> {
         &mut self,
         keys: &[Name<'s>],
         value: ValueNode,
-        layout: KnownTableKinds,
+        layout: TableKindPredicates,
     ) -> Result<(), KeyError> {
         let mut table = Self::ROOT;
         let mut depth = 0;
@@ -89,7 +89,7 @@ impl<'s> Document<'s> {
         keys: &[Name<'s>],
         depth: usize,
         table: TableId,
-        layout: KnownTableKinds,
+        layout: TableKindPredicates,
     ) -> Result<KeyPartTarget, KeyError> {
         let (name, next) = (&keys[depth], &keys[depth + 1]);
         let is_list = || {
@@ -126,7 +126,7 @@ impl<'s> Document<'s> {
         keys: &[Name<'s>],
         depth: usize,
         table: TableId,
-        layout: KnownTableKinds,
+        layout: TableKindPredicates,
     ) -> Result<(), KeyError> {
         let is_in_group = depth == 1 && (layout.is_group)(&keys[0].text);
         if is_in_group && self.find_in_table(table, &keys[1].text).is_none() {

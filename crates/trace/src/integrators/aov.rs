@@ -1,6 +1,6 @@
 //! First-hit AOVs. All except depth are display values in [0, 1], not radiance.
 
-use super::layers::{SampleLayer, SampleLayerValues};
+use super::layers::{SampleBatchLayerValues, SampleLayer};
 use super::photons::{GatherPoint, PhotonPassesBySample};
 use super::transport::packet::PacketHits;
 use super::transport::ray::PathRay;
@@ -32,7 +32,7 @@ pub fn shade_first_hit_aov(
         let vertex = SurfaceVertex::new(tile, &path, &hit);
         let surface = &vertex.surface;
         radiance[path.slot as usize] = match quantity {
-            FirstHitQuantity::Normal => (vertex.perturbed_front_normal(counters) + Vec3::ONE) * 0.5,
+            FirstHitQuantity::Normal => (vertex.unflipped_perturbed_normal(counters) + Vec3::ONE) * 0.5,
             FirstHitQuantity::Depth => Vec3::splat(view_depth(tile, surface.point)),
             FirstHitQuantity::Barycentric => surface.barycentric,
             FirstHitQuantity::Photons => {
@@ -51,7 +51,7 @@ pub fn record_first_hits_on_plain_surfaces(
     tile: &TileContext<'_>,
     (packet, surfaces): (&PacketHits, &SurfacePacket),
     first: u32,
-    values: &mut SampleLayerValues,
+    values: &mut SampleBatchLayerValues,
 ) -> u32 {
     let mut left = 0;
     let mut known = None;
@@ -86,7 +86,7 @@ fn constant_albedo(tile: &TileContext<'_>, index: usize) -> Option<Vec3> {
 pub fn record_first_hit_of_ray(
     tile: &TileContext<'_>,
     (path, hit): (&PathRay, &Hit),
-    values: &mut SampleLayerValues,
+    values: &mut SampleBatchLayerValues,
     counters: &mut RayCounters,
 ) {
     if let Some((path, hit)) = first_opaque_hit(tile, path, hit, counters) {
@@ -100,14 +100,17 @@ pub fn record_vertex(
     tile: &TileContext<'_>,
     slot: u32,
     vertex: &SurfaceVertex<'_>,
-    values: &mut SampleLayerValues,
+    values: &mut SampleBatchLayerValues,
     counters: &mut RayCounters,
 ) {
     let set = values.layer_set();
     // Look up only the textures needed for the layers.
     let albedo = if set.contains(SampleLayer::Albedo) { vertex_albedo(vertex, counters) } else { Vec3::ZERO };
-    let normal =
-        if set.contains(SampleLayer::Normal) { vertex.perturbed_front_normal(counters) } else { Vec3::ZERO };
+    let normal = if set.contains(SampleLayer::Normal) {
+        vertex.unflipped_perturbed_normal(counters)
+    } else {
+        Vec3::ZERO
+    };
     let depth = Vec3::splat(view_depth(tile, vertex.surface.point));
     values.add_first_hit(slot, [albedo, normal, depth]);
 }

@@ -96,7 +96,7 @@ impl FromIterator<SampleLayer> for LayerSet {
 
 /// Layer values of a batch of samples.
 #[derive(Default)]
-pub struct SampleLayerValues {
+pub struct SampleBatchLayerValues {
     set: LayerSet,
     /// First slot of the batch.
     first: u32,
@@ -106,12 +106,12 @@ pub struct SampleLayerValues {
     values: Vec<f32>,
     /// Index of each layer's first component among the values of a sample, for layers in the set.
     places: [Option<usize>; SampleLayer::ALL.len()],
-    /// The tile's most recent results of [`SampleLayerValues::cached_constant_albedo`], by material index
+    /// The tile's most recent results of [`SampleBatchLayerValues::cached_constant_albedo`], by material index
     /// modulo the array length.
     albedos: [Option<(usize, Option<Vec3>)>; 16],
 }
 
-impl SampleLayerValues {
+impl SampleBatchLayerValues {
     /// Begins a tile.
     pub fn clear_cached_albedos(&mut self) {
         self.albedos = Default::default();
@@ -218,9 +218,9 @@ impl SampleLayerValues {
     }
 }
 
-/// Kernel of [`SampleLayerValues::add_to_sums`].
+/// Kernel of [`SampleBatchLayerValues::add_to_sums`].
 struct LayerSumKernel<'a> {
-    values: &'a mut SampleLayerValues,
+    values: &'a mut SampleBatchLayerValues,
     sums: &'a mut LayerSums,
     samples: usize,
     radiance: &'a [Vec3],
@@ -232,7 +232,7 @@ impl SimdKernel for LayerSumKernel<'_> {
 
     #[inline(always)]
     fn run(self, _: impl Simd) {
-        let Self { values: SampleLayerValues { first, size, values, .. }, sums, samples, .. } = self;
+        let Self { values: SampleBatchLayerValues { first, size, values, .. }, sums, samples, .. } = self;
         let begin = *first as usize;
         let end = begin + values.len() / *size;
         let radiance = &self.radiance[begin..end];
@@ -269,7 +269,7 @@ mod tests {
     #[test]
     fn non_finite_samples_are_zero_in_all_layers() {
         let set: LayerSet = [SampleLayer::Depth, SampleLayer::Diffuse].into_iter().collect();
-        let (mut values, mut sums) = (SampleLayerValues::default(), LayerSums::zero(set.len(), 2));
+        let (mut values, mut sums) = (SampleBatchLayerValues::default(), LayerSums::zero(set.len(), 2));
         for slots in [0..2, 2..4] {
             values.begin_batch(set, &slots);
             for slot in slots {

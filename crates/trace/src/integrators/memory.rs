@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 
 use super::direct::queue::DirectLightVertexQueue;
-use super::layers::SampleLayerValues;
+use super::layers::SampleBatchLayerValues;
 use super::transport::accumulator::PathDiffuseFractions;
 use super::transport::scratch::TraceBuffers;
 
@@ -17,7 +17,7 @@ pub struct ThreadMemory {
     /// Diffuse fractions of the paths, if layers are recorded.
     pub fractions: PathDiffuseFractions,
     /// Values of the layers, if there are any.
-    pub layers: SampleLayerValues,
+    pub layers: SampleBatchLayerValues,
 }
 
 impl ThreadMemory {

@@ -77,7 +77,7 @@ pub fn trace_camera_paths(
         for (first, row) in (start..).step_by(PACKET_SIZE).zip(&*camera) {
             negative(first, row.negative);
             let count = (slots.end - first).min(PACKET_SIZE as u32) as usize;
-            paths.trace_packet(PacketSource::Camera(row, first, count, first - slots.start))?;
+            paths.intersect_and_queue_packet(PacketSource::Camera(row, first, count, first - slots.start))?;
         }
     }
     paths.shade_queued_vertices()?;
@@ -91,11 +91,11 @@ pub fn trace_camera_paths(
             tile.closest_hits(rays, hits)?;
             object_order.sort(hits);
             for places in object_order.grouped_queue_indices().chunks(PACKET_SIZE) {
-                paths.trace_packet(PacketSource::Traced(rays, hits, places))?;
+                paths.intersect_and_queue_packet(PacketSource::Traced(rays, hits, places))?;
             }
         } else {
             for (packet, first) in rays.chunks(PACKET_SIZE).zip((0..).step_by(PACKET_SIZE)) {
-                paths.trace_packet(PacketSource::Paths(packet, first))?;
+                paths.intersect_and_queue_packet(PacketSource::Paths(packet, first))?;
             }
         }
         paths.shade_queued_vertices()?;
@@ -132,13 +132,13 @@ struct CameraPathWavefront<'a, 's> {
 impl CameraPathWavefront<'_, '_> {
     /// Intersects a packet of rays, adds the emission they find, and queues the vertices at which the paths
     /// may scatter.
-    fn trace_packet(&mut self, rays: PacketSource<'_>) -> Result<(), Canceled> {
+    fn intersect_and_queue_packet(&mut self, rays: PacketSource<'_>) -> Result<(), Canceled> {
         let tile = self.tile;
         if (rays.queue_index(0) as usize).is_multiple_of(POLL_INTERVAL) {
             tile.token.check_pause_and_cancel()?;
         }
         // Intersect the rays. The vertices of plain surfaces are ready for the queue.
-        let are_lit = self.may_scatter() && self.accumulator.accepts_reflected();
+        let are_lit = self.is_below_max_depth() && self.accumulator.accepts_reflected();
         let aov = self.accumulator.aov;
         let buffers = (self.direct.spare_batch(), &mut *self.surfaces);
         let packet = tile.intersect_packet(rays, aov, are_lit, buffers);
@@ -178,7 +178,7 @@ impl CameraPathWavefront<'_, '_> {
     fn shade_queued_vertices(&mut self) -> Result<(), Canceled> {
         let (tile, aov, depth) = (self.tile, self.accumulator.aov, self.depth);
         let shares_with_paths = self.paths_compete_with_light_samples();
-        for vertices in self.direct.light_sampling_groups(tile) {
+        for vertices in self.direct.jointly_sampled_packet_ranges(tile) {
             // Sample lights.
             self.direct.sample_group_lights(vertices.clone(), tile, aov, shares_with_paths)?;
             for (index, number) in vertices.clone().enumerate() {
@@ -197,7 +197,7 @@ impl CameraPathWavefront<'_, '_> {
             // Sample BSDFs, with Russian roulette.
             for number in vertices {
                 let row = self.direct.batch_at_index(number);
-                let Some(continuation) = self.continuation_at_vertices(row) else { continue };
+                let Some(continuation) = self.continuation_rules_at_vertices(row) else { continue };
                 let fractions = self.accumulator.diffuse_fractions();
                 let has_fractions = fractions.is_some() && row.only_specular_before != 0;
                 let before = self.next.len();
@@ -215,7 +215,7 @@ impl CameraPathWavefront<'_, '_> {
     }
 
     /// How the paths continue at a packet of vertices, or `None` if they end there.
-    fn continuation_at_vertices(&self, row: &VertexBatch) -> Option<BounceContinuationRules> {
+    fn continuation_rules_at_vertices(&self, row: &VertexBatch) -> Option<BounceContinuationRules> {
         let extends_narrow = row.bsdf.extends_narrow_lobe_paths() && self.tile.behavior.mirrors;
         let narrow = || BounceContinuationRules::new(self.tile, self.depth, LobesToSample::Narrow);
         let policy = self.continuation.or_else(|| extends_narrow.then(narrow));

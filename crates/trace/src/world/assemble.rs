@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::null_interaction::SeeThroughObjects;
-use super::packet_material::PacketMaterial;
+use super::packet_material::PacketShadingMaterial;
 use super::{Camera, Geometry, GlassSolids, ObjectMaterial, World, WorldInputs, file_materials, lower};
 use crate::assets::LoadedMesh;
 use crate::control::CancelToken;
@@ -31,7 +31,7 @@ impl World {
         let world = Self {
             camera,
             geometry,
-            packet_material: materials.iter().map(PacketMaterial::from_material).collect(),
+            packet_material: materials.iter().map(PacketShadingMaterial::from_material).collect(),
             has_directions: materials.iter().any(|material| material.bsdf.is_anisotropic()),
             textured: materials.iter().map(Material::needs_uvs_or_tangents).collect(),
             mipmapped: materials.iter().map(Material::is_mipmapped).collect(),
@@ -54,7 +54,7 @@ impl World {
             see_through: None,
         };
         Self {
-            unlit_glass: world.find_glass_untouched_by_lights(),
+            unlit_glass: world.find_glass_not_touching_lights(),
             lens_glass: world.find_closed_glass_near_lens(),
             enclosing_glass: world.closed_glass_shapes_by_subtree(),
             camera_solids: world.find_solids_around_camera(),

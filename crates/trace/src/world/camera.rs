@@ -152,7 +152,7 @@ impl Camera {
     /// Returns the camera as position, target and up vector. An orbiter camera is rounded to short decimals,
     /// precise enough to render the same view. Its target is the point on the view axis at the distance of
     /// the orbiter's center.
-    pub fn resolve_look_at_camera(
+    pub fn resolve_to_look_at(
         camera: &description::Camera,
         orbiter: Option<&GkitOrbiterCamera>,
     ) -> ResolvedCamera {

@@ -111,7 +111,7 @@ fn orbiter_viewpoint_matches_the_camera() {
             focus: None,
         };
         let of_file = Camera::from_description(&scene, Some(&orbiter));
-        let view = Camera::resolve_look_at_camera(&scene, Some(&orbiter));
+        let view = Camera::resolve_to_look_at(&scene, Some(&orbiter));
         let by_vectors = Camera::from_description(&view.into(), None);
         for (a, b) in [
             (of_file.position, by_vectors.position),

@@ -114,7 +114,7 @@ impl World {
         } else {
             self.collect_surfaces_near_hit(at, memory)
         };
-        self.visit_coincident_candidates(at, (memory, error), visit)
+        self.visit_coincident_surfaces(at, (memory, error), visit)
     }
 
     /// Collects surfaces that may coincide with the hit point or enclose it, and returns their error bound per
@@ -137,7 +137,7 @@ impl World {
         is_away && self.is_glass_material(self.material_index(at.hit) as u32)
     }
 
-    /// Fast path for [`World::visit_coincident_candidates`] if [`World::is_glass_thicker_than`] is true and
+    /// Fast path for [`World::visit_coincident_surfaces`] if [`World::is_glass_thicker_than`] is true and
     /// nothing else is nearby. In this case, only the incoming ray's side matters.
     fn visit_glass_entered_at_isolated_hit(
         &self,
@@ -160,7 +160,7 @@ impl World {
 
     /// Computes the offset points and visits the coincident surfaces among the candidates in `memory`, whose
     /// error is at most `error`.
-    pub fn visit_coincident_candidates(
+    pub fn visit_coincident_surfaces(
         &self,
         at: &CoincidenceQuery<'_>,
         (memory, error): (&CoincidenceScratch, Vec3),
@@ -201,7 +201,7 @@ impl World {
                 mesh.and_then(|mesh| mesh.intersect_segment_with_triangle(triangle, ends))
             {
                 let hit = Hit { shape, object };
-                found(self.build_coincident_surface(hit, self.material_index(&hit) as u32, is_front));
+                found(self.coincident_surface_at_hit(hit, self.material_index(&hit) as u32, is_front));
             }
         }
         if is_led || closed_lead { sides } else { OffsetPoints { before: probe.close, ..sides } }
@@ -224,10 +224,10 @@ impl World {
         let own = shape.intersect(&ray)?;
         let is_front =
             shape.surface_point_with_fields(&ray, &own, bare).normal.as_dvec3().dot(ray.direction) < 0.0;
-        Some(self.build_coincident_surface(Hit { shape: own, object }, material, is_front))
+        Some(self.coincident_surface_at_hit(Hit { shape: own, object }, material, is_front))
     }
 
-    fn build_coincident_surface(
+    fn coincident_surface_at_hit(
         &self,
         hit: Hit,
         material: u32,

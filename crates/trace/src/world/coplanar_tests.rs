@@ -6,7 +6,7 @@ use crate::accel::InstructionSet;
 use crate::control::CancelToken;
 use crate::geometry::Ray;
 use crate::geometry::mesh::TriangleMesh;
-use crate::lights::LightSceneGeometry;
+use crate::lights::GeometryOfLight;
 use crate::math::Vec3;
 use crate::math::origin::local_coordinate_origin;
 use crate::math::random::signed_number_generator as random;
@@ -310,7 +310,7 @@ fn lifted_lights_are_hit_only_from_the_front() {
             let scene = scene_from_toml(&tables);
             for accel in [Accel::Bvh, Accel::KdTree] {
                 let geometry = build_geometry(&scene, accel);
-                assert_eq!(geometry.light_lifts_by_object().len(), 2);
+                assert_eq!(geometry.coplanar_light_offsets().len(), 2);
                 for _ in 0..50 {
                     let target = Vec3::new(next() * 0.1, 0.0, next() * 0.1);
                     let from = Vec3::new(next() * 8.0, 0.5 + next().abs() * 9.0, next() * 8.0);
@@ -320,7 +320,7 @@ fn lifted_lights_are_hit_only_from_the_front() {
                     // it.
                     let shadow = Ray::segment_ending_before_point(from, target);
                     assert!(
-                        !geometry.is_occluded_except_by_light(&shadow, LightSceneGeometry::Object(number)),
+                        !geometry.is_occluded_except_by_light(&shadow, GeometryOfLight::Object(number)),
                         "{tables} {from}"
                     );
                     let is_closed = tables.contains("box") || tables.contains("cylinder");
@@ -328,10 +328,10 @@ fn lifted_lights_are_hit_only_from_the_front() {
                     let hit = geometry.closest_hit(&Ray::new(below, target - below)).expect("a hit");
                     assert!(is_closed || hit.object != number, "{tables} {below}");
                     // Light samples are occluded from the same positions as hits.
-                    let lift = geometry.light_lifts_by_object()[number as usize].as_vec3();
+                    let lift = geometry.coplanar_light_offsets()[number as usize].as_vec3();
                     let hidden = Ray::segment_ending_before_point(below, target + lift);
                     assert!(
-                        geometry.is_occluded_except_by_light(&hidden, LightSceneGeometry::Object(number)),
+                        geometry.is_occluded_except_by_light(&hidden, GeometryOfLight::Object(number)),
                         "{tables} {below}"
                     );
                 }
@@ -351,7 +351,7 @@ fn packets_match_single_rays_at_lifted_lights() {
             let loaded = LoadedMesh { mesh: mesh.clone(), ..LoadedMesh::default() };
             let geometry = build_geometry_with_mesh(&scene_from_toml(&tables), accel, loaded)
                 .with_instruction_set(instructions);
-            assert!(!geometry.light_lifts_by_object().is_empty());
+            assert!(!geometry.coplanar_light_offsets().is_empty());
             assert_packets(&geometry);
         }
     }
@@ -373,7 +373,7 @@ fn lights_in_tilted_and_distant_planes_are_lifted() {
         };
         let tables = format!("{}{}", quad(3.0, "w"), quad(1.0, "l"));
         let geometry = build_geometry(&scene_from_toml(&tables), Accel::Bvh);
-        assert_eq!(geometry.light_lifts_by_object().len(), 2, "{tables}");
+        assert_eq!(geometry.coplanar_light_offsets().len(), 2, "{tables}");
         for _ in 0..50 {
             let target = center + (x * vector().x + y * vector().x) * 0.9;
             let from = target + x.cross(y) * (2.0 + f64::from(round)) + vector() * 2.0;

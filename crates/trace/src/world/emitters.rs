@@ -13,11 +13,13 @@ use crate::geometry::Shape;
 use crate::lights::MeshEmitter;
 use crate::lights::infinite::sky::sun::OrientedSunDisk;
 use crate::lights::infinite::sky::{Sky, SkyFrame};
-use crate::lights::infinite::{DirectionalLight, Environment, EnvironmentMap, MapOrientation, MapRows};
+use crate::lights::infinite::{
+    DirectionalLight, Environment, EnvironmentMap, MapOrientation, MapRowPlacement,
+};
 use crate::lights::{
     AreaLight, BlendPartWeight, BoundingSphere, EmissionModulation, EmissionTerm, Light, LightBounds, Lights,
-    PhotonEmitter, Side, TriangleWithUvs, UvMapping, back_area_light, front_area_light,
-    see_through_shape_side_light,
+    PhotonEmitter, Side, TriangleWithUvs, UvMapping, back_area_light, create_see_through_side_light,
+    front_area_light,
 };
 use crate::lights::{Emitter, EmittingPart};
 use crate::materials::texels::Texels;
@@ -27,7 +29,7 @@ use crate::math::transform::Transform;
 use crate::scene::description::{self, MaterialKind, Scene};
 
 /// Sampling tables for the environment map, or `None` if the image is black.
-pub fn build_environment_map(texels: &Arc<Texels>, rows: MapRows) -> Option<Arc<EnvironmentMap>> {
+pub fn build_environment_map(texels: &Arc<Texels>, rows: MapRowPlacement) -> Option<Arc<EnvironmentMap>> {
     EnvironmentMap::with_rows(Arc::clone(texels), rows).map(Arc::new)
 }
 
@@ -236,7 +238,7 @@ fn area_lights_of_shape(
     let of_side = move |side: &Side| {
         let (radiance, terms) = emissive.radiance_and_terms(*side);
         let light = match (emissive.is_sheer, side) {
-            (true, side) => see_through_shape_side_light(shape, *side, radiance, object)?,
+            (true, side) => create_see_through_side_light(shape, *side, radiance, object)?,
             (false, Side::Front) => front_area_light(shape, radiance, object)?,
             (false, Side::Back) => back_area_light(shape, radiance, object)?,
         };

@@ -4,15 +4,15 @@ use std::sync::Arc;
 
 use super::Images;
 use super::lower::{PlasticCoat, add_coat_to_lobes, lower_plastic};
-use super::lower_texture::lower_file_texture;
+use super::lower_texture::lower_mesh_file_texture;
 use super::textures::{FILE_NUMBER, color_or_cutout_interpretation, opacity_pixel_interpretation};
 use crate::assets::{FileMaterial, FileMaterialKind, FileTexture, PhysicalMaterial};
 use crate::materials::microfacet::MicrofacetDistribution;
 use crate::materials::texture::{ColorOrTexture, ValueScaleAndOffset};
 use crate::materials::{
-    Bsdf, Coat, CoatInputs, Conductor, ConductorFresnel, Dielectric, Emission, Material, Mirror, NonSpecular,
-    NormalMap, NormalPerturbation, Opacity, Phong, Principled, PrincipledInputs, ReflectingSides,
-    ScalarParameter,
+    Bsdf, Coat, CoatTexturedParameters, Conductor, ConductorFresnel, Dielectric, Emission, Material, Mirror,
+    NonSpecular, NormalMap, NormalPerturbation, Opacity, Phong, Principled, PrincipledInputs,
+    ReflectingSides, ScalarParameter,
 };
 use crate::math::{DVec3, Vec3};
 use crate::scene::description::PixelInterpretation;
@@ -34,7 +34,7 @@ pub fn file_material_emission(images: &Images, own: &FileMaterial) -> Emission {
         None => constant,
         // If the emission map could not be read, emit nothing rather than from the whole surface.
         Some(texture) => {
-            match lower_file_texture(images, texture, color_or_cutout_interpretation(own, texture)) {
+            match lower_mesh_file_texture(images, texture, color_or_cutout_interpretation(own, texture)) {
                 None => Emission::NONE,
                 texture => Emission { texture, ..constant },
             }
@@ -48,9 +48,9 @@ pub fn file_material_opacity(images: &Images, own: &FileMaterial) -> Option<Opac
         return None;
     }
     let texture = own.opacity_texture.as_ref();
-    let value = match texture
-        .and_then(|texture| lower_file_texture(images, texture, opacity_pixel_interpretation(own, texture)))
-    {
+    let value = match texture.and_then(|texture| {
+        lower_mesh_file_texture(images, texture, opacity_pixel_interpretation(own, texture))
+    }) {
         Some(texture) => ScalarParameter::Texture(texture),
         None if own.opacity < 1.0 => ScalarParameter::Constant(own.opacity),
         None => return None,
@@ -91,7 +91,7 @@ pub fn lower_file_material(images: &Images, own: &FileMaterial) -> Material {
 /// Non-specular material from a mesh file, including its emission and normal map.
 fn non_specular_file_material(images: &Images, own: &FileMaterial, rough: NonSpecular) -> Material {
     let normals = own.normal_texture.as_ref().and_then(|texture| {
-        let texture = lower_file_texture(images, texture, PixelInterpretation::Normal)?;
+        let texture = lower_mesh_file_texture(images, texture, PixelInterpretation::Normal)?;
         Some(NormalMap { texture, strength: own.normal_strength })
     });
     // Gray images are height maps. Ignore them because the file does not specify the scale.
@@ -113,7 +113,7 @@ fn file_material_color_parameter(
     constant: Vec3,
 ) -> ColorOrTexture {
     let texture = texture.and_then(|texture| {
-        lower_file_texture(images, texture, color_or_cutout_interpretation(own, texture))
+        lower_mesh_file_texture(images, texture, color_or_cutout_interpretation(own, texture))
     });
     texture.map_or(ColorOrTexture::Constant(constant), ColorOrTexture::Texture)
 }
@@ -160,7 +160,7 @@ fn file_material_number_parameter(
     texture: Option<&FileTexture>,
     constant: f32,
 ) -> ScalarParameter {
-    let texture = texture.and_then(|texture| lower_file_texture(images, texture, FILE_NUMBER));
+    let texture = texture.and_then(|texture| lower_mesh_file_texture(images, texture, FILE_NUMBER));
     texture.map_or(ScalarParameter::Constant(constant), ScalarParameter::Texture)
 }
 
@@ -168,7 +168,7 @@ fn file_material_number_parameter(
 fn file_material_coat(images: &Images, physical: &PhysicalMaterial) -> Option<Coat> {
     let PhysicalMaterial { clearcoat, clearcoat_roughness, .. } = *physical;
     let roughness = physical.clearcoat_roughness_texture.as_ref();
-    Coat::new(CoatInputs {
+    Coat::new(CoatTexturedParameters {
         weight: file_material_number_parameter(images, physical.clearcoat_texture.as_ref(), clearcoat),
         roughness: file_material_number_parameter(images, roughness, clearcoat_roughness),
         ior: FileMaterial::DEFAULT_IOR,

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::accel::{Bvh, InstructionSet, SphericalShell};
 use crate::control::{CancelToken, Canceled};
 use crate::geometry::{Aabb, Ray, Shape, ShapeHit, SurfacePoint, SurfaceRequest};
-use crate::lights::LightSceneGeometry;
+use crate::lights::GeometryOfLight;
 use crate::math::color::srgb8_color_to_linear;
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::scene::description::{self, LoweredShape, Scene};
@@ -86,7 +86,7 @@ impl Geometry {
     }
 
     /// One translation per object, or empty if no objects are moved; see [`super::find_coplanar_lights`].
-    pub fn light_lifts_by_object(&self) -> &[DVec3] {
+    pub fn coplanar_light_offsets(&self) -> &[DVec3] {
         &self.lifts
     }
 
@@ -113,7 +113,7 @@ impl Geometry {
             let with_all: Vec<Aabb> = each.chain([meshes.bounds()]).collect();
             let of_merged = meshes.bounds();
             let shell = |id: u32| {
-                objects.get(id as usize).map_or(SphericalShell::from_bounds(&of_merged), |_| shell(id))
+                objects.get(id as usize).map_or(SphericalShell::enclosing_box(&of_merged), |_| shell(id))
             };
             Ok(MergedMeshesWithTopTree {
                 over: Bvh::build(&with_all, token)?.with_shells_if_nested(shell),
@@ -162,7 +162,7 @@ impl Geometry {
     /// Returns the merged meshes if they are represented by `id`, an id from [`Geometry::traced_tree`], or
     /// `None` if `id` refers to a real object.
     #[inline(always)]
-    pub(super) fn merged_meshes_if_represented_by(&self, id: u32) -> Option<&MergedMeshes> {
+    pub(super) fn merged_meshes_if_proxy_id(&self, id: u32) -> Option<&MergedMeshes> {
         let merged = self.merged.as_ref()?;
         (id as usize == self.objects.len()).then_some(&merged.meshes)
     }
@@ -180,14 +180,14 @@ impl Geometry {
 
     /// Whether a light is an entire merged mesh. Shadow rays to such lights use the per-mesh trees instead.
     #[inline(always)]
-    pub(super) fn is_light_entire_merged_mesh(&self, source: LightSceneGeometry) -> bool {
+    pub(super) fn is_light_entire_merged_mesh(&self, source: GeometryOfLight) -> bool {
         match (source, &self.merged) {
-            (LightSceneGeometry::Object(object), Some(merged)) => merged.meshes.contains_object(object),
+            (GeometryOfLight::Object(object), Some(merged)) => merged.meshes.contains_object(object),
             (
-                LightSceneGeometry::Nothing
-                | LightSceneGeometry::Object(_)
-                | LightSceneGeometry::SeeThrough(_)
-                | LightSceneGeometry::Primitive(..),
+                GeometryOfLight::Nothing
+                | GeometryOfLight::Object(_)
+                | GeometryOfLight::SeeThrough(_)
+                | GeometryOfLight::Primitive(..),
                 _,
             ) => false,
         }
@@ -228,7 +228,7 @@ impl Geometry {
     /// Returns the nearest hit. At equal distances, the lowest object id wins.
     pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
         self.closest_hit_with_unbounded(self.traced_tree(), ray, |id, segment| {
-            match self.merged_meshes_if_represented_by(id) {
+            match self.merged_meshes_if_proxy_id(id) {
                 Some(merged) => {
                     let shape = merged.closest_hit_with_merged_index(segment)?;
                     let MergedTriangle { object, primitive } = merged.triangle(shape.primitive);
@@ -281,24 +281,20 @@ impl Geometry {
     }
 
     /// Whether anything other than the light itself blocks a shadow ray.
-    pub fn is_occluded_except_by_light(&self, ray: &Ray, source: LightSceneGeometry) -> bool {
+    pub fn is_occluded_except_by_light(&self, ray: &Ray, source: GeometryOfLight) -> bool {
         let ray_f64 = ray.to_f64();
         let any = |id: u32, except: Option<u32>| self.objects[id as usize].any_hit(ray, &ray_f64, except);
         let of_object = |id: u32| match source {
-            LightSceneGeometry::Nothing => any(id, None),
-            LightSceneGeometry::Object(own) | LightSceneGeometry::SeeThrough(own) => {
-                own != id && any(id, None)
-            }
-            LightSceneGeometry::Primitive(own, part) => any(id, (own == id).then_some(part)),
+            GeometryOfLight::Nothing => any(id, None),
+            GeometryOfLight::Object(own) | GeometryOfLight::SeeThrough(own) => own != id && any(id, None),
+            GeometryOfLight::Primitive(own, part) => any(id, (own == id).then_some(part)),
         };
-        let test = |id: u32| match (self.merged_meshes_if_represented_by(id), source) {
+        let test = |id: u32| match (self.merged_meshes_if_proxy_id(id), source) {
             (
                 Some(merged),
-                LightSceneGeometry::Nothing
-                | LightSceneGeometry::Object(_)
-                | LightSceneGeometry::SeeThrough(_),
+                GeometryOfLight::Nothing | GeometryOfLight::Object(_) | GeometryOfLight::SeeThrough(_),
             ) => merged.any_hit(ray, None),
-            (Some(merged), LightSceneGeometry::Primitive(own, part)) => {
+            (Some(merged), GeometryOfLight::Primitive(own, part)) => {
                 merged.any_hit(ray, merged.merged_triangle_index(own, part))
             }
             (None, _) => of_object(id),
@@ -387,7 +383,7 @@ impl Geometry {
 fn bounding_spherical_shell(object: &Object, bounds: &Aabb) -> SphericalShell {
     match object {
         Object::Shape(Shape::Sphere(sphere)) => SphericalShell::from_sphere(sphere.center, sphere.radius),
-        Object::Shape(_) | Object::Mesh(_) => SphericalShell::from_bounds(bounds),
+        Object::Shape(_) | Object::Mesh(_) => SphericalShell::enclosing_box(bounds),
     }
 }
 

@@ -70,7 +70,7 @@ impl ObjectRegionIsolationStates {
     }
 
     /// Creates a table with one state per grid cell of a shape's bounding box.
-    fn for_grid_cells(margin: f32, bounds: &Aabb) -> Self {
+    fn empty_for_grid_cells(margin: f32, bounds: &Aabb) -> Self {
         let dense = Vec3::splat(CELLS as f32) / bounds.extent();
         // A flat box is one cell thick.
         let dense = Vec3::from(dense.to_array().map(|dense| if dense.is_finite() { dense } else { 0.0 }));
@@ -100,7 +100,7 @@ impl ObjectRegionIsolationStates {
 }
 
 /// A surface region to test for isolation.
-enum SurfaceRegion {
+enum SurfacePatch {
     /// A grid cell, expanded by the margin.
     GridCell(Aabb),
     /// The inner part of a triangle.
@@ -117,7 +117,7 @@ impl Geometry {
     pub fn is_hit_isolated(&self, hit: &Hit, surface: &SurfacePoint, margin: Vec3) -> bool {
         let object = &self.objects()[hit.object as usize];
         let table = self.isolated_region_cache().tables[hit.object as usize]
-            .get_or_init(|| self.new_isolation_states_for_object(object));
+            .get_or_init(|| self.new_neighbor_free_region_table(object));
         if !(margin.max_element() <= table.margin) {
             return false;
         }
@@ -133,7 +133,7 @@ impl Geometry {
                 let find = || {
                     let all = shape.bounds().unwrap_or(Aabb::EMPTY);
                     let around = cell.bounds(&all).expanded(Vec3::splat(table.margin));
-                    if self.is_region_isolated(&around, &SurfaceRegion::GridCell(around), hit.object) {
+                    if self.is_region_isolated(&around, &SurfacePatch::GridCell(around), hit.object) {
                         1
                     } else {
                         NEVER
@@ -146,7 +146,7 @@ impl Geometry {
 
     /// Creates an object's table. The margin covers rays from up to four scene sizes away. Longer rays have
     /// larger margins and do not use the table.
-    fn new_isolation_states_for_object(&self, object: &Object) -> ObjectRegionIsolationStates {
+    fn new_neighbor_free_region_table(&self, object: &Object) -> ObjectRegionIsolationStates {
         let of_rays =
             self.max_mesh_rounding_error() + 8.0 * f32::EPSILON * self.isolated_region_cache().reach;
         match object {
@@ -161,7 +161,7 @@ impl Geometry {
             Object::Shape(shape) => match shape.bounds() {
                 Some(bounds) => {
                     let size = bounds.min.abs().max(bounds.max.abs()).max_element();
-                    ObjectRegionIsolationStates::for_grid_cells(
+                    ObjectRegionIsolationStates::empty_for_grid_cells(
                         of_rays.max(64.0 * f32::EPSILON * size),
                         &bounds,
                     )
@@ -196,7 +196,7 @@ impl Geometry {
                 continue;
             }
             let inner = smaller(corners, parts);
-            let region = SurfaceRegion::Triangle { corners: inner, apart };
+            let region = SurfacePatch::Triangle { corners: inner, apart };
             let around = Aabb::from_points_f64(inner).expanded(Vec3::splat(2.0 * margin));
             if self.is_region_isolated(&around, &region, object) {
                 return parts as u8;
@@ -206,7 +206,7 @@ impl Geometry {
     }
 
     /// Whether no other objects are near a region. Every object near the region must overlap `around`.
-    fn is_region_isolated(&self, around: &Aabb, region: &SurfaceRegion, own: u32) -> bool {
+    fn is_region_isolated(&self, around: &Aabb, region: &SurfacePatch, own: u32) -> bool {
         let is_near = |id: u32| match &self.objects()[id as usize] {
             Object::Shape(shape) => shape_may_overlap_region(shape, around, region),
             Object::Mesh(mesh) => {
@@ -245,7 +245,7 @@ fn is_triangle_apart_from_rest_of_mesh(
 }
 
 /// Whether a shape may intersect a region or enclose it.
-fn shape_may_overlap_region(shape: &Shape, around: &Aabb, region: &SurfaceRegion) -> bool {
+fn shape_may_overlap_region(shape: &Shape, around: &Aabb, region: &SurfacePatch) -> bool {
     if shape.bounds().is_some_and(|bounds| !bounds.overlaps(around)) {
         return false;
     }
@@ -271,7 +271,7 @@ fn shape_may_overlap_region(shape: &Shape, around: &Aabb, region: &SurfaceRegion
     true
 }
 
-impl SurfaceRegion {
+impl SurfacePatch {
     /// Whether a triangle may be near the region. Triangles that do not overlap `around` are not near.
     fn is_triangle_near(&self, triangle: [DVec3; 3], around: &Aabb) -> bool {
         match self {

@@ -4,13 +4,14 @@ use std::sync::Arc;
 
 use super::Images;
 use super::lower_texture::lower_texture;
-use super::textures::{HashableAlphaCutoff, coverage_preserving_cutoff};
+use super::textures::{HashableAlphaCutoff, cutoff_for_mip_coverage};
 use crate::materials::microfacet::MicrofacetDistribution;
 use crate::materials::texture::{ColorOrTexture, Texture};
 use crate::materials::{
-    Blend, Bsdf, Bump, Coat, CoatInputs, CoatedMaterial, Conductor, ConductorFresnel, Dielectric, Emission,
-    Material, Mirror, NonSpecular, NormalMap, NormalPerturbation, Opacity, Phong, Plastic, Principled,
-    PrincipledInputs, ScalarParameter, SpecularLayer, SpecularOverBase, ThinDielectric, TranslucentPhong,
+    Blend, Bsdf, Bump, Coat, CoatTexturedParameters, CoatedMaterial, Conductor, ConductorFresnel, Dielectric,
+    Emission, Material, Mirror, NonSpecular, NormalMap, NormalPerturbation, Opacity, Phong, Plastic,
+    Principled, PrincipledInputs, ScalarParameter, SpecularLayer, SpecularOverBase, ThinDielectric,
+    TranslucentPhong,
 };
 use crate::math::Vec3;
 use crate::scene::description::{
@@ -94,7 +95,7 @@ pub fn lower_opacity(scene: &Scene, images: &Images, material: &description::Mat
             let of = MaterialParameterConverter { scene, images, material };
             let texture = of.lower_texture(index, TextureRole::Opacity(number));
             // If mip levels preserve coverage, the cutoff already includes the factor.
-            let coverage = coverage_preserving_cutoff(scene, index, source.cutoff);
+            let coverage = cutoff_for_mip_coverage(scene, index, source.cutoff);
             let texture = Arc::unwrap_or_clone(texture);
             let texture = Arc::new(texture.map_image_factor(|factor| factor.filter(|_| coverage.is_none())));
             (ScalarParameter::Texture(texture), coverage.map_or(source.cutoff, HashableAlphaCutoff::value))
@@ -278,7 +279,7 @@ impl MaterialParameterConverter<'_> {
         let CoatSource { weight, roughness, ior, tint } = source;
         source
             .exists()
-            .then(|| CoatInputs {
+            .then(|| CoatTexturedParameters {
                 weight: self.lower_number(weight, role),
                 roughness: self.lower_number(roughness, role),
                 ior: *ior,

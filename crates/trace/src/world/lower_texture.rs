@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::textures::{TextureImageSource, file_texture_source, scene_material_texture_source};
+use super::textures::{TextureImageKey, file_texture_source, scene_material_texture_source};
 use super::{Images, TexelsAndMipmaps};
 use crate::assets::FileTexture;
 use crate::materials::UvSet;
@@ -12,7 +12,7 @@ use crate::materials::texture::{
     ValueScaleAndOffset, Wrap,
 };
 use crate::math::Vec3;
-use crate::scene::description::{self, ImageSource, PixelInterpretation, Scene, TextureContent, TextureRole};
+use crate::scene::description::{self, ImageSource, PixelInterpretation, Scene, TextureRole, TextureSource};
 
 /// Converts a texture of a material from the scene file, given by its index and role.
 pub(super) fn lower_texture(
@@ -23,11 +23,11 @@ pub(super) fn lower_texture(
 ) -> Texture {
     let declared = &scene.textures[index];
     match &declared.content {
-        TextureContent::Image(image) => {
+        TextureSource::Image(image) => {
             let source = scene_material_texture_source(scene, material, (index, role), image);
             Texture::Image(lower_image(declared, image, loaded_image_or_placeholder(images, &source), role))
         }
-        TextureContent::Pattern { colors, pattern } => {
+        TextureSource::Pattern { colors, pattern } => {
             Texture::Pattern(lower_pattern(declared, *colors, pattern, role))
         }
     }
@@ -82,7 +82,7 @@ fn lower_pattern(
 
 /// Converts a texture of a mesh file. Returns `None` if the image was not loaded, either because it is not
 /// needed or because it could not be read.
-pub(super) fn lower_file_texture(
+pub(super) fn lower_mesh_file_texture(
     images: &Images,
     texture: &FileTexture,
     used: PixelInterpretation,
@@ -108,7 +108,7 @@ pub(super) fn lower_file_texture(
 
 /// Returns a loaded image, or a placeholder if the image was not loaded. Images that are not loaded are used
 /// only by materials without objects, whose textures are never looked up.
-fn loaded_image_or_placeholder(images: &Images, source: &TextureImageSource) -> TexelsAndMipmaps {
+fn loaded_image_or_placeholder(images: &Images, source: &TextureImageKey) -> TexelsAndMipmaps {
     images.get(source).cloned().unwrap_or_else(|| {
         let data = TexelData::Linear8(vec![[128, 128, 255]]);
         TexelsAndMipmaps {

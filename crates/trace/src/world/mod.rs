@@ -33,7 +33,7 @@ mod unlit_glass;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-pub use crate::accel::{InstructionSet, PACKET_SIZE, RayBoxInterval, SimdKernel, TreeNodeInfo};
+pub use crate::accel::{InstructionSet, NodeBoundsAndDepth, PACKET_SIZE, RayBoxInterval, SimdKernel};
 pub use camera::{Camera, FilmPosition, FilmPositionPacket, PixelFootprint};
 pub use camera_interior::CompoundSolid;
 pub use contact::{
@@ -50,12 +50,12 @@ pub use mesh_tree::MeshTree;
 pub use null_interaction::{MAX_NULL_INTERACTIONS, ShadowTransmittancePacket};
 pub use object::Object;
 pub use origin::choose_origin_near_camera_target;
-pub use packet_material::PacketMaterial;
+pub use packet_material::PacketShadingMaterial;
 pub use textures::{
-    HashableAlphaCutoff, NeededTexture, TextureImageSource, TextureRolesNeededByRender,
-    environment_map_source, scene_material_texture_source, textures_needed,
+    HashableAlphaCutoff, NeededTexture, TextureImageKey, TextureRolesNeededByRender, environment_map_source,
+    scene_material_texture_source, textures_needed,
 };
-pub use unlit_glass::LightBallAndObjectBoxes;
+pub use unlit_glass::LightBoundingBoxes;
 
 use crate::assets::GkitOrbiterCamera;
 use crate::geometry::SurfacePoint;
@@ -70,7 +70,7 @@ use crate::math::transform::Transform;
 use crate::scene::description;
 
 /// A scene's decoded images, indexed by source.
-pub type Images = HashMap<TextureImageSource, TexelsAndMipmaps>;
+pub type Images = HashMap<TextureImageKey, TexelsAndMipmaps>;
 
 /// A decoded image.
 #[derive(Clone, Debug)]
@@ -106,7 +106,7 @@ pub struct World {
     /// Materials, referenced by index from the objects.
     pub materials: Vec<Material>,
     /// Packet-shading data of each material, or `None` for materials that are not plain.
-    packet_material: Box<[Option<PacketMaterial>]>,
+    packet_material: Box<[Option<PacketShadingMaterial>]>,
     /// Whether any material's lobes depend on the texture axes.
     has_directions: bool,
     /// Whether each material needs UVs or tangents; see [`Material::needs_uvs_or_tangents`].

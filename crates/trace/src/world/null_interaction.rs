@@ -11,7 +11,7 @@ use crate::accel::{AnyHitCallback, F32x16};
 use crate::geometry::packet::{RayPacket, set_bit_lanes};
 use crate::geometry::ray::offset_origin;
 use crate::geometry::{Ray, SurfaceRequest};
-use crate::lights::{LightSceneGeometry, LightSceneGeometryPacket};
+use crate::lights::{EmitterObjectPacket, GeometryOfLight};
 use crate::materials::{Footprint, Material};
 use crate::math::Vec3;
 use crate::math::lanes::{Simd, Vec3x16, set_lane};
@@ -87,7 +87,7 @@ impl World {
         rows: &RayPacket,
         ends: &F32x16,
         traced: u32,
-        sources: &LightSceneGeometryPacket,
+        sources: &EmitterObjectPacket,
     ) -> ShadowTransmittancePacket {
         self.geometry.instruction_set().run(ShadowTransmittanceKernel {
             world: self,
@@ -99,12 +99,12 @@ impl World {
     }
 
     /// Whether a shadow ray's transmittance is zero.
-    pub fn has_zero_transmittance_along(&self, ray: &Ray, source: LightSceneGeometry) -> bool {
+    pub fn has_zero_transmittance_along(&self, ray: &Ray, source: GeometryOfLight) -> bool {
         self.transmittance(ray, source, &mut 0) == Vec3::ZERO
     }
 
     /// Transmittance along a shadow ray to its light.
-    pub fn transmittance(&self, ray: &Ray, source: LightSceneGeometry, lookups: &mut u64) -> Vec3 {
+    pub fn transmittance(&self, ray: &Ray, source: GeometryOfLight, lookups: &mut u64) -> Vec3 {
         let Some(see_through) = &self.see_through else {
             return if self.geometry.is_occluded_except_by_light(ray, source) {
                 Vec3::ZERO
@@ -112,7 +112,7 @@ impl World {
                 Vec3::ONE
             };
         };
-        let is_own = |object: u32| source == LightSceneGeometry::Object(object);
+        let is_own = |object: u32| source == GeometryOfLight::Object(object);
         let stops = |object: u32| !see_through.contains_object(object) && !is_own(object);
         if self.geometry.closest_hit_on_objects_where(ray, stops).is_some() {
             return Vec3::ZERO;
@@ -141,23 +141,23 @@ impl World {
         &self,
         see_through: &SeeThroughObjects,
         ray: &Ray,
-        source: LightSceneGeometry,
+        source: GeometryOfLight,
         lookups: &mut u64,
     ) -> Vec3 {
         let (mut left, mut ray, mut count) = (Vec3::ONE, *ray, 0);
-        let is_own = |object: u32| source == LightSceneGeometry::Object(object);
+        let is_own = |object: u32| source == GeometryOfLight::Object(object);
         // The sampled point may be at the end of the ray, up to rounding.
         let end = SAME_DISTANCE * ray.t_max;
         while let Some(hit) = self.geometry.closest_hit_on_objects_where(&ray, |object| {
             see_through.contains_object(object) && !is_own(object)
         }) {
-            if source == LightSceneGeometry::SeeThrough(hit.object) && hit.shape.t >= ray.t_max - end {
+            if source == GeometryOfLight::SeeThrough(hit.object) && hit.shape.t >= ray.t_max - end {
                 break;
             }
             let (part, beyond) = self.transmittance_and_continued_ray(&ray, &hit, lookups);
             ray = beyond;
             // A light does not occlude itself.
-            if source == LightSceneGeometry::Primitive(hit.object, hit.shape.primitive) {
+            if source == GeometryOfLight::Primitive(hit.object, hit.shape.primitive) {
                 continue;
             }
             (left, count) = (left * part, count + 1);
@@ -178,7 +178,7 @@ struct ShadowTransmittanceKernel<'a> {
     rows: &'a RayPacket,
     ends: &'a F32x16,
     traced: u32,
-    sources: &'a LightSceneGeometryPacket,
+    sources: &'a EmitterObjectPacket,
 }
 
 impl SimdKernel for ShadowTransmittanceKernel<'_> {

@@ -5,7 +5,7 @@ use super::{Geometry, Hit};
 use crate::accel::{AnyHitCallback, ClosestHitCallback, F32x16, PACKET_SIZE, SimdKernel};
 use crate::geometry::Ray;
 use crate::geometry::packet::{HitPacket, RayPacket, nonnegative_end_mask, set_bit_lanes};
-use crate::lights::{LightSceneGeometry, LightSceneGeometryPacket};
+use crate::lights::{EmitterObjectPacket, GeometryOfLight};
 use crate::math::lanes::{Simd, TRUE, select, select_u32};
 
 impl Geometry {
@@ -48,7 +48,7 @@ impl Geometry {
         rows: &RayPacket,
         ends: &F32x16,
         traced: u32,
-        sources: &LightSceneGeometryPacket,
+        sources: &EmitterObjectPacket,
         simd: impl Simd,
     ) -> u32 {
         simd.call_out_of_line(OcclusionKernel { geometry: self, rows, ends, traced, sources })
@@ -58,13 +58,13 @@ impl Geometry {
 impl Geometry {
     /// Mask of rays whose light is an entire merged mesh.
     #[inline(always)]
-    pub(super) fn light_is_entire_merged_mesh_mask(&self, sources: &LightSceneGeometryPacket) -> u32 {
+    pub(super) fn light_is_entire_merged_mesh_mask(&self, sources: &EmitterObjectPacket) -> u32 {
         if !sources.is_any || !self.has_merged_meshes() {
             return 0;
         }
         let is_whole = |lane: usize| {
-            sources.part[lane] == LightSceneGeometryPacket::NONE
-                && self.is_light_entire_merged_mesh(LightSceneGeometry::Object(sources.object[lane]))
+            sources.part[lane] == EmitterObjectPacket::NONE
+                && self.is_light_entire_merged_mesh(GeometryOfLight::Object(sources.object[lane]))
         };
         (0..PACKET_SIZE).filter(|&lane| is_whole(lane)).fold(0, |bits, lane| bits | 1 << lane)
     }
@@ -96,7 +96,7 @@ impl Geometry {
         rows: &RayPacket,
         ends: &F32x16,
         traced: u32,
-        sources: &LightSceneGeometryPacket,
+        sources: &EmitterObjectPacket,
     ) -> u32 {
         let is_occluded = |&lane: &usize| {
             self.is_occluded_except_by_light(
@@ -114,7 +114,7 @@ struct OcclusionKernel<'a> {
     rows: &'a RayPacket,
     ends: &'a F32x16,
     traced: u32,
-    sources: &'a LightSceneGeometryPacket,
+    sources: &'a EmitterObjectPacket,
 }
 
 impl SimdKernel for OcclusionKernel<'_> {
@@ -171,7 +171,7 @@ impl<F: Simd> ClosestHitCallback for ClosestHitTest<'_, F> {
     fn intersect_primitive(&mut self, id: u32, active: u32, ends: &mut F32x16) {
         let mut found = HitPacket::without_hits();
         let (these, mut objects) = (masked_ends(active, ends), [id; PACKET_SIZE]);
-        match self.geometry.merged_meshes_if_represented_by(id) {
+        match self.geometry.merged_meshes_if_proxy_id(id) {
             Some(merged) => {
                 let by = self.geometry.instruction_set();
                 merged.closest_hit_packet(by, self.rows, (active, &these), &mut found);
@@ -214,7 +214,7 @@ fn resolve_merged_hits(merged: &MergedMeshes, found: &mut HitPacket) -> [u32; PA
 pub(super) struct OcclusionTest<'a, F> {
     geometry: &'a Geometry,
     rows: &'a RayPacket,
-    sources: &'a LightSceneGeometryPacket,
+    sources: &'a EmitterObjectPacket,
     /// Mask of rays whose light is a single primitive of an object.
     in_part: u32,
     simd: F,
@@ -226,7 +226,7 @@ impl<'a, F: Simd> OcclusionTest<'a, F> {
     pub(super) fn new(
         geometry: &'a Geometry,
         rows: &'a RayPacket,
-        sources: &'a LightSceneGeometryPacket,
+        sources: &'a EmitterObjectPacket,
         simd: F,
     ) -> Self {
         Self { geometry, rows, sources, in_part: light_is_single_primitive_mask(sources, simd), simd }
@@ -236,7 +236,7 @@ impl<'a, F: Simd> OcclusionTest<'a, F> {
 impl<F: Simd> AnyHitCallback for OcclusionTest<'_, F> {
     #[inline(always)]
     fn primitive_hit_mask(&mut self, id: u32, active: u32, ends: &F32x16) -> u32 {
-        if let Some(merged) = self.geometry.merged_meshes_if_represented_by(id) {
+        if let Some(merged) = self.geometry.merged_meshes_if_proxy_id(id) {
             let these = masked_ends(active, ends);
             if self.in_part & active == 0 {
                 return merged.any_hit_packet(
@@ -272,20 +272,20 @@ impl<F: Simd> AnyHitCallback for OcclusionTest<'_, F> {
 
 /// Mask of rays whose light is a single primitive of an object.
 #[inline(always)]
-fn light_is_single_primitive_mask(sources: &LightSceneGeometryPacket, simd: impl Simd) -> u32 {
+fn light_is_single_primitive_mask(sources: &EmitterObjectPacket, simd: impl Simd) -> u32 {
     if !sources.is_any {
         return 0;
     }
     let mut in_part = [0; PACKET_SIZE];
     for lane in 0..PACKET_SIZE {
-        in_part[lane] = if sources.part[lane] == LightSceneGeometryPacket::NONE { 0 } else { TRUE };
+        in_part[lane] = if sources.part[lane] == EmitterObjectPacket::NONE { 0 } else { TRUE };
     }
     simd.movemask(&in_part)
 }
 
 /// Mask of rays whose light is on object `id`.
 #[inline(always)]
-fn light_is_on_object_mask(sources: &LightSceneGeometryPacket, id: u32, simd: impl Simd) -> u32 {
+fn light_is_on_object_mask(sources: &EmitterObjectPacket, id: u32, simd: impl Simd) -> u32 {
     if !sources.is_any {
         return 0;
     }
@@ -320,7 +320,7 @@ pub(super) mod tests {
     use crate::geometry::parallelogram::Parallelogram;
     use crate::geometry::plane::Plane;
     use crate::geometry::sphere::Sphere;
-    use crate::lights::LightSceneGeometry;
+    use crate::lights::GeometryOfLight;
     use crate::math::random::signed_number_generator as random;
     use crate::math::transform::Transform;
     use crate::math::{DVec3, Vec3};
@@ -381,7 +381,7 @@ pub(super) mod tests {
     struct OccludedRayPacketKernel<'a> {
         geometry: &'a Geometry,
         rays: &'a [Ray],
-        sources: &'a LightSceneGeometryPacket,
+        sources: &'a EmitterObjectPacket,
     }
 
     impl SimdKernel for OccludedRayPacketKernel<'_> {
@@ -423,12 +423,12 @@ pub(super) mod tests {
             let alone: Vec<_> = rays.iter().map(|ray| geometry.closest_hit(ray)).collect();
             assert_eq!(found, alone, "{rays:?}");
             let source = |lane: usize| match alone[lane] {
-                Some(hit) if lane.is_multiple_of(3) => LightSceneGeometry::Object(hit.object),
-                Some(hit) if lane % 3 == 1 => LightSceneGeometry::Primitive(hit.object, hit.shape.primitive),
-                _ => LightSceneGeometry::Object(u32::MAX),
+                Some(hit) if lane.is_multiple_of(3) => GeometryOfLight::Object(hit.object),
+                Some(hit) if lane % 3 == 1 => GeometryOfLight::Primitive(hit.object, hit.shape.primitive),
+                _ => GeometryOfLight::Object(u32::MAX),
             };
             let sources: Vec<_> = (0..rays.len()).map(source).collect();
-            let mut row = LightSceneGeometryPacket::splat(LightSceneGeometry::Nothing);
+            let mut row = EmitterObjectPacket::splat(GeometryOfLight::Nothing);
             sources.iter().enumerate().for_each(|(lane, source)| row.set_geometry(lane, *source));
             let occluded = geometry.instruction_set().run(OccludedRayPacketKernel {
                 geometry,

@@ -7,7 +7,7 @@ use crate::math::Vec3;
 
 /// Data for shading a plain material in packets.
 #[derive(Clone, Copy, Debug)]
-pub struct PacketMaterial {
+pub struct PacketShadingMaterial {
     /// Kind of BSDF.
     pub kind: BxdfKind,
     /// UV set for the BSDF texture used in packet shading, or `None` without a texture.
@@ -22,7 +22,7 @@ pub struct PacketMaterial {
     pub is_black_from_behind: bool,
 }
 
-impl PacketMaterial {
+impl PacketShadingMaterial {
     /// Creates the packet-shading data for a material. Returns `None` if the material perturbs normals, has
     /// textured or coated emission, may be a null interaction, or has a BSDF that does not support packets.
     pub(super) fn from_material(material: &Material) -> Option<Self> {
@@ -32,7 +32,7 @@ impl PacketMaterial {
         let rough = bsdf.as_non_specular().filter(|rough| rough.supports_packets())?;
         (is_even && normal_perturbation.is_none() && opacity.is_none()).then(|| Self {
             kind: rough.kind(),
-            row_texture: rough.packet_texture().map(Texture::uv_set),
+            row_texture: rough.texture_for_packets().map(Texture::uv_set),
             ambient: rough
                 .as_untextured()
                 .filter(|_| !is_black_from_behind)
@@ -44,7 +44,7 @@ impl PacketMaterial {
     }
 }
 
-impl PacketMaterial {
+impl PacketShadingMaterial {
     /// Whether the material emits light.
     #[inline(always)]
     pub fn is_emissive(&self) -> bool {
@@ -55,7 +55,10 @@ impl PacketMaterial {
 impl World {
     /// Packet-shading data and BSDF of a material, or `None` if the material is not plain.
     #[inline(always)]
-    pub fn material_for_packet_shading(&self, material: usize) -> Option<(&PacketMaterial, &NonSpecular)> {
+    pub fn material_for_packet_shading(
+        &self,
+        material: usize,
+    ) -> Option<(&PacketShadingMaterial, &NonSpecular)> {
         let packet_material = self.packet_material[material].as_ref()?;
         Some((packet_material, self.materials[material].bsdf.as_non_specular()?))
     }

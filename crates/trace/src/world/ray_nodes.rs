@@ -1,7 +1,7 @@
 //! Visits the tree nodes intersected by a ray.
 
 use super::{Geometry, Object};
-use crate::accel::{RayBoxInterval, TreeNodeInfo};
+use crate::accel::{NodeBoundsAndDepth, RayBoxInterval};
 use crate::geometry::Ray;
 
 impl Geometry {
@@ -11,7 +11,7 @@ impl Geometry {
     pub fn visit_nodes_along_ray(
         &self,
         ray: &Ray,
-        mut visit: impl FnMut(&Ray, &TreeNodeInfo, &RayBoxInterval) -> bool,
+        mut visit: impl FnMut(&Ray, &NodeBoundsAndDepth, &RayBoxInterval) -> bool,
     ) {
         let mut below = Vec::new();
         self.traced_tree().visit_nodes_along_ray(
@@ -21,7 +21,7 @@ impl Geometry {
         );
         for (id, above) in below {
             let (local, tree) = match (
-                self.merged_meshes_if_represented_by(id),
+                self.merged_meshes_if_proxy_id(id),
                 self.objects().get(id as usize).and_then(Object::mesh),
             ) {
                 (Some(merged), _) => (*ray, merged.tree()),
@@ -29,14 +29,14 @@ impl Geometry {
                 (None, None) => continue,
             };
             tree.visit_nodes_along_ray(&local, |cell, stretch| {
-                visit(&local, &TreeNodeInfo { depth: above + cell.depth, ..*cell }, stretch)
+                visit(&local, &NodeBoundsAndDepth { depth: above + cell.depth, ..*cell }, stretch)
             });
         }
     }
 
     /// Traversal cost of a ray: the number of intersected boxes, plus the number of shapes in intersected
     /// leaves, plus the number of infinite objects.
-    pub fn traversal_cost(&self, ray: &Ray) -> u32 {
+    pub fn ray_traversal_cost(&self, ray: &Ray) -> u32 {
         let mut count = self.unbounded().len() as u32;
         self.visit_nodes_along_ray(ray, |_, cell, _| {
             count += 1 + cell.shapes;

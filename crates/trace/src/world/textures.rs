@@ -15,7 +15,7 @@ use crate::scene::description::{
 
 /// An image file and its encoding.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
-pub struct TextureImageSource {
+pub struct TextureImageKey {
     /// File path.
     pub path: PathBuf,
     /// Index of the image in a glTF file, or `None` for a separate image file.
@@ -47,7 +47,7 @@ impl HashableAlphaCutoff {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NeededTexture {
     /// The file and its encoding.
-    pub source: TextureImageSource,
+    pub source: TextureImageKey,
     /// Name shown in progress bars.
     pub name: String,
     /// Index into [`Scene::textures`], or `None` if only a mesh file refers to the image.
@@ -202,7 +202,7 @@ pub fn textures_needed(
             });
         }
     }
-    if let Some(file) = environment_file(scene).filter(|_| lookups.lights) {
+    if let Some(file) = environment_map_path(scene).filter(|_| lookups.lights) {
         add(NeededTexture::for_environment(file));
     }
     needed
@@ -217,17 +217,17 @@ fn texture_uses_mipmaps(scene: &Scene, texture: usize) -> bool {
 }
 
 /// The environment map's file, or `None` if there is no map or the map's color factor is black.
-pub fn environment_map_source(scene: &Scene) -> Option<TextureImageSource> {
-    environment_file(scene).map(environment_source_from_path)
+pub fn environment_map_source(scene: &Scene) -> Option<TextureImageKey> {
+    environment_map_path(scene).map(environment_source_from_path)
 }
 
-fn environment_file(scene: &Scene) -> Option<&Path> {
+fn environment_map_path(scene: &Scene) -> Option<&Path> {
     let environment = scene.environment.as_ref().filter(|environment| environment.color != Vec3::ZERO)?;
     Some(&environment.file.as_ref()?.value)
 }
 
-fn environment_source_from_path(file: &Path) -> TextureImageSource {
-    TextureImageSource { path: file.to_owned(), image: None, encoding: ColorEncoding::Color, coverage: None }
+fn environment_source_from_path(file: &Path) -> TextureImageKey {
+    TextureImageKey { path: file.to_owned(), image: None, encoding: ColorEncoding::Color, coverage: None }
 }
 
 /// Which of the scene's materials are used by objects, and which mesh files' materials are used by mesh
@@ -251,11 +251,11 @@ pub fn scene_material_texture_source(
     material: &Material,
     (texture, role): (usize, TextureRole),
     image: &ImageSource,
-) -> TextureImageSource {
+) -> TextureImageKey {
     let source = scene_texture_source(image, texture_pixel_interpretation(scene, material, (texture, role)));
     match role {
-        TextureRole::Opacity(_) => TextureImageSource {
-            coverage: coverage_preserving_cutoff(scene, texture, material.opacity.cutoff),
+        TextureRole::Opacity(_) => TextureImageKey {
+            coverage: cutoff_for_mip_coverage(scene, texture, material.opacity.cutoff),
             ..source
         },
         TextureRole::Diffuse
@@ -273,7 +273,7 @@ pub fn scene_material_texture_source(
 
 /// Cutoff at which an opacity texture's mip levels preserve coverage, or `None` without a cutoff or mip
 /// levels, and for patterns.
-pub fn coverage_preserving_cutoff(scene: &Scene, texture: usize, cutoff: f32) -> Option<HashableAlphaCutoff> {
+pub fn cutoff_for_mip_coverage(scene: &Scene, texture: usize, cutoff: f32) -> Option<HashableAlphaCutoff> {
     let is_image = scene.textures[texture].as_image().is_some();
     let is_covered = cutoff > 0.0 && texture_uses_mipmaps(scene, texture) && is_image;
     is_covered.then(|| {
@@ -329,7 +329,7 @@ fn have_same_image_and_mapping(scene: &Scene, a: usize, b: usize) -> bool {
 }
 
 /// Image file and encoding for a scene texture with this pixel interpretation.
-pub fn scene_texture_source(image: &ImageSource, used: PixelInterpretation) -> TextureImageSource {
+pub fn scene_texture_source(image: &ImageSource, used: PixelInterpretation) -> TextureImageKey {
     let encoding = match (image.encoding, used) {
         (TextureEncoding::Srgb, PixelInterpretation::Color | PixelInterpretation::Normal) => {
             ColorEncoding::Srgb
@@ -353,11 +353,11 @@ pub fn scene_texture_source(image: &ImageSource, used: PixelInterpretation) -> T
             ColorEncoding::Number { of, is_srgb: false }
         }
     };
-    TextureImageSource { path: image.file.value.clone(), image: image.image, encoding, coverage: None }
+    TextureImageKey { path: image.file.value.clone(), image: image.image, encoding, coverage: None }
 }
 
 /// Returns the image file to load for a texture of a mesh file, and how to decode it for this use.
-pub fn file_texture_source(texture: &FileTexture, used: PixelInterpretation) -> TextureImageSource {
+pub fn file_texture_source(texture: &FileTexture, used: PixelInterpretation) -> TextureImageKey {
     let encoding = match used {
         PixelInterpretation::Color => ColorEncoding::Color,
         PixelInterpretation::CutOut => ColorEncoding::CutOut(ColorTransferFunction::Auto),
@@ -366,7 +366,7 @@ pub fn file_texture_source(texture: &FileTexture, used: PixelInterpretation) -> 
             ColorEncoding::Number { of: texture.number.unwrap_or(of), is_srgb: false }
         }
     };
-    TextureImageSource { path: texture.path.clone(), image: None, encoding, coverage: None }
+    TextureImageKey { path: texture.path.clone(), image: None, encoding, coverage: None }
 }
 
 /// How textures from mesh files are used as scalar parameters.

@@ -1,7 +1,7 @@
 //! Acceleration structure over triangles: a BVH or a kd-tree, with bit-identical hits.
 
 use crate::accel::wide_bvh::Quality;
-use crate::accel::{F32x16, KdTree, RayBoxInterval, TreeNodeInfo, WideBvh};
+use crate::accel::{F32x16, KdTree, NodeBoundsAndDepth, RayBoxInterval, WideBvh};
 use crate::control::{CancelToken, Canceled};
 use crate::geometry::{Aabb, Ray, ShapeHit};
 use crate::math::Vec3;
@@ -67,7 +67,7 @@ impl TriangleTree {
     pub fn visit_nodes_along_ray(
         &self,
         ray: &Ray,
-        visit: impl FnMut(&TreeNodeInfo, &RayBoxInterval) -> bool,
+        visit: impl FnMut(&NodeBoundsAndDepth, &RayBoxInterval) -> bool,
     ) {
         match self {
             Self::Boxes(tree) => tree.visit_nodes_along_ray(ray, visit),

@@ -10,7 +10,7 @@ const ROUNDING: f32 = 1e-5;
 
 /// Two bounding boxes of the same light, which is inside both of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LightBallAndObjectBoxes {
+pub struct LightBoundingBoxes {
     /// Bounding box of the light's bounding sphere.
     of_ball: Aabb,
     /// Bounding box of the emitting object.
@@ -19,9 +19,9 @@ pub struct LightBallAndObjectBoxes {
     pub object: Option<u32>,
 }
 
-impl LightBallAndObjectBoxes {
+impl LightBoundingBoxes {
     /// Whether the light may intersect a box.
-    pub fn may_light_intersect_box(&self, bounds: &Aabb) -> bool {
+    pub fn may_light_source_overlap_box(&self, bounds: &Aabb) -> bool {
         self.of_ball.overlaps(bounds) && self.of_object.is_none_or(|own| own.overlaps(bounds))
     }
 
@@ -39,7 +39,7 @@ impl LightBallAndObjectBoxes {
 impl World {
     /// Finds the closed glass solids that are not touched by a light. The result is empty if no glass is
     /// rough.
-    pub(super) fn find_glass_untouched_by_lights(&self) -> Box<[bool]> {
+    pub(super) fn find_glass_not_touching_lights(&self) -> Box<[bool]> {
         if !self.has_rough_glass() {
             return Box::default();
         }
@@ -56,7 +56,7 @@ impl World {
         }
         // Keep the closed solids that cannot be touched by a light.
         let may_contain_light =
-            |bounds: &Aabb| light_boxes.iter().any(|light| light.may_light_intersect_box(bounds));
+            |bounds: &Aabb| light_boxes.iter().any(|light| light.may_light_source_overlap_box(bounds));
         let is_dark = |(body, bounds): (u32, &Option<Aabb>)| {
             let closed = bounds
                 .as_ref()
@@ -67,7 +67,7 @@ impl World {
     }
 
     /// Bounding boxes of all finite lights, with a margin for rounding.
-    pub fn finite_light_boxes(&self) -> Vec<LightBallAndObjectBoxes> {
+    pub fn finite_light_boxes(&self) -> Vec<LightBoundingBoxes> {
         let boxes = self.lights.iter().filter_map(|(_, light)| {
             let bounds = light.bounds_if_emissive().filter(|_| !light.is_infinite())?;
             let (center, radius) = (bounds.center.as_vec3(), bounds.radius as f32);
@@ -76,7 +76,7 @@ impl World {
             let of_ball = Aabb::from_points([center - around, center + around]);
             let object = light.as_area().map(|area| area.object);
             let bounds = object.and_then(|object| self.geometry.objects()[object as usize].bounds());
-            Some(LightBallAndObjectBoxes {
+            Some(LightBoundingBoxes {
                 of_ball,
                 of_object: bounds.map(|own| own.expanded(Vec3::splat(room))),
                 object,

@@ -219,7 +219,7 @@ fn isolated_regions_match_the_full_search() {
                 } else {
                     world.collect_surfaces_near_hit(&at, &mut memory)
                 };
-                (world.visit_coincident_candidates(&at, (&memory, error), |one| near.push(one)), near)
+                (world.visit_coincident_surfaces(&at, (&memory, error), |one| near.push(one)), near)
             };
             let searched = found(false);
             let is_isolated =

@@ -9,8 +9,8 @@ use crate::geometry::mesh::TriangleMesh;
 use crate::materials::texels::Texels;
 use crate::math::{DVec3, Vec3};
 use crate::scene::description::{
-    Accel, Environment, MapOrientation, MapRows, MeshFile, MeshReference, Object, ObjectTransform, Scene,
-    Shape, Spanned,
+    Accel, Environment, MapOrientation, MapRowPlacement, MeshFile, MeshReference, Object, ObjectTransform,
+    Scene, Shape, Spanned,
 };
 use crate::world::{
     EnvironmentSource, Geometry, Images, MeshTree, World, WorldInputs, build_environment_map, build_lights,
@@ -63,7 +63,7 @@ impl TestWorldBuilder {
     /// Adds an environment map.
     pub fn sky(mut self, texels: &Arc<Texels>) -> Self {
         let file = Some(Spanned { value: PathBuf::from("sky.exr"), span: 0..0 });
-        let (orientation, rows) = (MapOrientation::Turn(0.0), MapRows::Centers);
+        let (orientation, rows) = (MapOrientation::Turn(0.0), MapRowPlacement::Centers);
         self.scene.environment = Some(Environment { color: Vec3::ONE, file, sky: None, orientation, rows });
         self.sky = Some(Arc::clone(texels));
         self
@@ -78,7 +78,7 @@ impl TestWorldBuilder {
         let map = || {
             self.sky
                 .as_ref()
-                .and_then(|texels| build_environment_map(texels, MapRows::Centers))
+                .and_then(|texels| build_environment_map(texels, MapRowPlacement::Centers))
                 .map(EnvironmentSource::Map)
         };
         let sky = sky.map(|sky| EnvironmentSource::Sky(build_sky(sky))).or_else(map);

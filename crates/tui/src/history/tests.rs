@@ -158,7 +158,7 @@ fn entries_have_their_render_numbers() {
     for (generation, run) in [(1, Some(1)), (2, None), (3, Some(2))] {
         let (shown, origin) = of_image(generation, &generation.to_string(), run.is_some());
         history.record_shown_image(shown, Instant::now(), origin);
-        assert!(history.is_newest_from_request(generation) && history.is_newest_unfinished());
+        assert!(history.newest_is_from_request(generation) && history.is_newest_unfinished());
         run.into_iter().for_each(|run| history.finish_newest(run));
     }
     assert_eq!([0, 1, 2].map(|at| history.render_number_at(at)), [Some(1), None, Some(2)]);
@@ -172,7 +172,7 @@ fn entries_have_their_render_numbers() {
 
 fn edit(history: &mut RenderHistory) {
     history.record_scene_edit();
-    history.mark_scene_edits_read();
+    history.record_scene_read();
 }
 
 #[test]

@@ -150,7 +150,7 @@ impl Decoder {
             }
             PendingSequence::Doubtful(bytes) => self.continue_ambiguous_sequence(bytes, byte, now),
             PendingSequence::Paste(mut paste) => {
-                if paste.byte_completes_end_marker(byte, now) {
+                if paste.push_byte_and_check_end(byte, now) {
                     self.meaning.found.push(DecodedInput::Paste);
                 } else {
                     self.held = PendingSequence::Paste(paste);

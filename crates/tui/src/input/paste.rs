@@ -62,7 +62,7 @@ impl ActivePaste {
     }
 
     /// Processes one byte. Returns true if it completes the end marker.
-    pub(super) fn byte_completes_end_marker(&mut self, byte: u8, now: Instant) -> bool {
+    pub(super) fn push_byte_and_check_end(&mut self, byte: u8, now: Instant) -> bool {
         let sequence = self.sequence.next_state(byte);
         if sequence.is_none() {
             self.last = now;

@@ -1,6 +1,6 @@
 //! Approximates a cell's pixels with two colors and a block character.
 
-use super::tile::{CellDivision, CellGrid, TwoPartBlockPattern};
+use super::tile::{CellGrid, TwoPartBlockPattern, TwoPartCellDivision};
 use crate::color::linear_to_oklab;
 use crate::math::Vec3;
 use crate::math::color::{linear_to_srgb8, srgb8_color_to_linear};
@@ -25,7 +25,7 @@ pub(crate) fn fit_cell(grid: CellGrid, pixels: &[[u8; 3]]) -> FittedCell {
         return FittedCell { tile: TwoPartBlockPattern::HALVES, pair: [*first, *second] };
     }
     let pixels: Vec<Vec3> = pixels.iter().map(|pixel| srgb8_color_to_linear(*pixel)).collect();
-    let CellDivision { first, tile } = best_division(grid, &pixels);
+    let TwoPartCellDivision { first, tile } = best_division(grid, &pixels);
     let mean = |is_first: bool| {
         let for_part = (0..pixels.len()).filter(|i| (first >> i & 1 == 1) == is_first);
         let count = for_part.clone().count().max(1);
@@ -35,12 +35,12 @@ pub(crate) fn fit_cell(grid: CellGrid, pixels: &[[u8; 3]]) -> FittedCell {
 }
 
 /// The division of a cell that minimizes the variance within its two parts.
-fn best_division(grid: CellGrid, pixels: &[Vec3]) -> CellDivision {
+fn best_division(grid: CellGrid, pixels: &[Vec3]) -> TwoPartCellDivision {
     let count = pixels.len() as f32;
     let labs: Vec<Vec3> = pixels.iter().map(|pixel| linear_to_oklab(*pixel)).collect();
     let all: Vec3 = labs.iter().sum();
     let (mut best, mut most) =
-        (CellDivision { first: 1, tile: TwoPartBlockPattern::HALVES }, f32::NEG_INFINITY);
+        (TwoPartCellDivision { first: 1, tile: TwoPartBlockPattern::HALVES }, f32::NEG_INFINITY);
     let (mut mask, mut sum, mut size) = (0_u32, Vec3::ZERO, 0.0_f32);
     for division in grid.all_divisions() {
         let mut changed = mask ^ division.first;
@@ -74,7 +74,7 @@ mod tests {
     fn two_color_patterns_are_reproduced() {
         let colors = [[200, 20, 20], [20, 40, 180]];
         for grid in [CellGrid::Quadrants, CellGrid::Sextants, CellGrid::Octants] {
-            for CellDivision { first, tile } in grid.all_divisions() {
+            for TwoPartCellDivision { first, tile } in grid.all_divisions() {
                 let pixels: Vec<[u8; 3]> =
                     (0..2 * grid.rows_per_cell()).map(|i| colors[usize::from(first >> i & 1 == 0)]).collect();
                 assert_eq!(fit_cell(grid, &pixels), FittedCell { tile: *tile, pair: colors });

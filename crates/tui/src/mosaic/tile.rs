@@ -124,7 +124,7 @@ static TABLE: LazyLock<BlockSymbolTable> = LazyLock::new(|| {
     for mask in 0..256 {
         if let Some((_, symbol)) = OCTANTS_ELSEWHERE.iter().find(|(other, _)| *other == mask) {
             add(*symbol, expand_mask_to_full_grid(mask, 4));
-        } else if equivalent_quadrant_mask(mask).is_none() {
+        } else if quadrant_mask_from_octants(mask).is_none() {
             add(char::from_u32(next).unwrap_or(' '), expand_mask_to_full_grid(mask, 4));
             next += 1;
         }
@@ -173,7 +173,7 @@ fn expand_rows(mask: u32, from: u32, to: u32) -> u32 {
 }
 
 /// The quadrants that fill the same area as a mask of octants, if any.
-fn equivalent_quadrant_mask(mask: u32) -> Option<u32> {
+fn quadrant_mask_from_octants(mask: u32) -> Option<u32> {
     (0..16).find(|quadrants| expand_mask_to_full_grid(*quadrants, 2) == expand_mask_to_full_grid(mask, 4))
 }
 
@@ -189,7 +189,7 @@ pub(crate) enum CellGrid {
 
 /// A division of a cell's pixels into two parts, and the tile that draws it.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct CellDivision {
+pub(super) struct TwoPartCellDivision {
     /// Mask of the pixels in the first part, in row order.
     pub(super) first: u32,
     pub(super) tile: TwoPartBlockPattern,
@@ -212,10 +212,11 @@ impl CellGrid {
 
     /// Lists all divisions of a two-column cell, starting with halves. Successive divisions usually differ in
     /// only one part of the grid.
-    pub(super) fn all_divisions(self) -> &'static [CellDivision] {
-        static QUADRANTS: LazyLock<Vec<CellDivision>> = LazyLock::new(|| all_cell_divisions(2, &[2]));
-        static SEXTANTS: LazyLock<Vec<CellDivision>> = LazyLock::new(|| all_cell_divisions(6, &[2, 3]));
-        static OCTANTS: LazyLock<Vec<CellDivision>> = LazyLock::new(|| all_cell_divisions(4, &[4]));
+    pub(super) fn all_divisions(self) -> &'static [TwoPartCellDivision] {
+        static QUADRANTS: LazyLock<Vec<TwoPartCellDivision>> = LazyLock::new(|| all_cell_divisions(2, &[2]));
+        static SEXTANTS: LazyLock<Vec<TwoPartCellDivision>> =
+            LazyLock::new(|| all_cell_divisions(6, &[2, 3]));
+        static OCTANTS: LazyLock<Vec<TwoPartCellDivision>> = LazyLock::new(|| all_cell_divisions(4, &[4]));
         match self {
             Self::Halves => &[],
             Self::Quadrants => &QUADRANTS,
@@ -227,9 +228,9 @@ impl CellGrid {
 
 /// Lists all divisions of a cell with `pixel_rows` rows of pixels along two-column grids. `part_rows`
 /// contains each grid's number of rows.
-fn all_cell_divisions(pixel_rows: u32, part_rows: &[u32]) -> Vec<CellDivision> {
+fn all_cell_divisions(pixel_rows: u32, part_rows: &[u32]) -> Vec<TwoPartCellDivision> {
     let mut divisions =
-        vec![CellDivision { first: (1 << pixel_rows) - 1, tile: TwoPartBlockPattern::HALVES }];
+        vec![TwoPartCellDivision { first: (1 << pixel_rows) - 1, tile: TwoPartBlockPattern::HALVES }];
     for rows in part_rows {
         let half = 1_u32 << (2 * rows - 1);
         // Iterate in Gray code order. The mask always includes the top left square.
@@ -237,10 +238,10 @@ fn all_cell_divisions(pixel_rows: u32, part_rows: &[u32]) -> Vec<CellDivision> {
             let of_tile =
                 pattern_and_inversion_for_mask(expand_mask_to_full_grid(mask, *rows)).map(|(tile, _)| tile);
             let is_new = |tile: &TwoPartBlockPattern| {
-                divisions.iter().all(|division: &CellDivision| division.tile != *tile)
+                divisions.iter().all(|division: &TwoPartCellDivision| division.tile != *tile)
             };
             if let Some(tile) = of_tile.filter(is_new) {
-                divisions.push(CellDivision { first: expand_rows(mask, *rows, pixel_rows), tile });
+                divisions.push(TwoPartCellDivision { first: expand_rows(mask, *rows, pixel_rows), tile });
             }
         }
     }
@@ -258,7 +259,7 @@ mod tests {
         {
             let divisions = grid.all_divisions();
             let mut seen = std::collections::HashSet::new();
-            for CellDivision { first, tile } in divisions {
+            for TwoPartCellDivision { first, tile } in divisions {
                 assert_eq!(
                     tile.first,
                     expand_rows(*first, grid.rows_per_cell(), GRID_ROWS),

@@ -1,7 +1,7 @@
 //! Candidate colors for a cell.
 
 use super::cell::TwoPartColorCell;
-use super::cost_model::RateDistortion;
+use super::cost_model::RateDistortionParameters;
 use super::terminal_color::{TerminalColor, decimal_digit_count};
 use crate::color::nearest_256_color_index;
 
@@ -27,7 +27,7 @@ pub(super) struct PartColorCandidates {
 /// possible.
 pub(super) fn candidate_colors_for_run_start(
     cells: &[Option<TwoPartColorCell>],
-    model: RateDistortion,
+    model: RateDistortionParameters,
 ) -> PartColorCandidates {
     let column = |part: usize| cells.iter().map_while(move |cell| cell.map(|mosaic| mosaic.pair[part]));
     let both = cells.iter().map_while(|cell| cell.map(|mosaic| mosaic.pair)).flatten();
@@ -40,7 +40,7 @@ pub(super) fn candidate_colors_for_run_start(
 
 fn candidate_colors_for_run(
     wanted: &(impl Iterator<Item = TerminalColor> + Clone),
-    model: RateDistortion,
+    model: RateDistortionParameters,
 ) -> Vec<TerminalColor> {
     let mut shades = Vec::with_capacity(MAX_CANDIDATES);
     let Some(first) = wanted.clone().next() else { return shades };
@@ -130,13 +130,13 @@ mod tests {
     #[test]
     fn candidates_cover_many_following_cells() {
         // 21 is within the tolerance of 20, 21 and 22, but not of 24.
-        let found = candidate_colors_for_run_start(&row(&[20, 21, 22, 24]), RateDistortion::EXACT);
+        let found = candidate_colors_for_run_start(&row(&[20, 21, 22, 24]), RateDistortionParameters::EXACT);
         assert_eq!(found.first, [TerminalColor::Rgb([21, 50, 99])]);
         assert_eq!(found.second, [TerminalColor::Rgb([0, 0, 0])], "themes may replace color 16");
         assert_eq!(found.both.len(), 1, "no color fits both halves");
         let grays = [Some(TwoPartColorCell::uniform(TerminalColor::Rgb([8, 8, 8])))];
         assert_eq!(
-            candidate_colors_for_run_start(&grays, RateDistortion::EXACT).first,
+            candidate_colors_for_run_start(&grays, RateDistortionParameters::EXACT).first,
             [TerminalColor::Rgb([8, 8, 8]), TerminalColor::Palette(232)]
         );
     }
@@ -150,12 +150,12 @@ mod tests {
             ])),
             None,
         ];
-        let found = candidate_colors_for_run_start(&cells, RateDistortion::MOVING);
+        let found = candidate_colors_for_run_start(&cells, RateDistortionParameters::MOVING);
         assert_eq!(
             (found.first, found.second),
             (vec![TerminalColor::DefaultBackground], vec![TerminalColor::Palette(3)])
         );
-        let found = candidate_colors_for_run_start(&[None], RateDistortion::MOVING);
+        let found = candidate_colors_for_run_start(&[None], RateDistortionParameters::MOVING);
         assert!(found.first.is_empty() && found.both.is_empty());
     }
 }

@@ -58,7 +58,7 @@ impl TwoPartColorCell {
 
     /// Lists pairs of colors that overlap when this cell is laid over `other`. The weight of each pair is
     /// twice the fraction of the cell where the two colors overlap.
-    pub(super) fn overlapping_color_pairs(
+    pub(super) fn color_overlaps_with(
         self,
         other: Self,
     ) -> impl Iterator<Item = (TerminalColor, TerminalColor, f32)> {

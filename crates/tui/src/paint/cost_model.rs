@@ -5,7 +5,7 @@ use super::terminal_color::TerminalColor;
 /// Relative weight of bytes and color error. The error of half a cell is the sum of its squared channel
 /// differences.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct RateDistortion {
+pub(super) struct RateDistortionParameters {
     /// Color error that is acceptable for each byte saved.
     pub(super) byte: f32,
     /// Maximum color difference per channel.
@@ -15,7 +15,7 @@ pub(super) struct RateDistortion {
     pub(super) spans: &'static [u8],
 }
 
-impl RateDistortion {
+impl RateDistortionParameters {
     /// Cost model for colors accurate to 1/255 per channel.
     pub(super) const EXACT: Self = Self { byte: 64.0, most: 1, spans: &[1] };
 
@@ -27,7 +27,7 @@ impl RateDistortion {
     pub(super) const MOVING: Self = Self { byte: 32.0, most: 255, spans: &[1, 4, 9] };
 
     /// Returns the model with its cost per byte changed to `byte`, but never below
-    /// [`RateDistortion::MOVING`].
+    /// [`RateDistortionParameters::MOVING`].
     pub(super) fn with_cost_per_byte(self, byte: f32) -> Self {
         let byte = byte.max(Self::MOVING.byte);
         let spans: &[u8] = match byte {
@@ -60,21 +60,24 @@ mod tests {
     #[test]
     fn error_is_a_bounded_sum_of_squares() {
         let (a, b) = (TerminalColor::Rgb([10, 20, 30]), TerminalColor::Rgb([11, 20, 32]));
-        assert_eq!(RateDistortion::MOVING.squared_color_error(a, b), 5.0);
-        assert_eq!(RateDistortion::EXACT.squared_color_error(a, b), f32::INFINITY);
-        assert_eq!(RateDistortion::EXACT.squared_color_error(a, TerminalColor::Rgb([9, 21, 30])), 2.0);
+        assert_eq!(RateDistortionParameters::MOVING.squared_color_error(a, b), 5.0);
+        assert_eq!(RateDistortionParameters::EXACT.squared_color_error(a, b), f32::INFINITY);
         assert_eq!(
-            RateDistortion::MOVING
+            RateDistortionParameters::EXACT.squared_color_error(a, TerminalColor::Rgb([9, 21, 30])),
+            2.0
+        );
+        assert_eq!(
+            RateDistortionParameters::MOVING
                 .squared_color_error(TerminalColor::Palette(16), TerminalColor::Rgb([1, 1, 0])),
             2.0
         );
         assert_eq!(
-            RateDistortion::MOVING
+            RateDistortionParameters::MOVING
                 .squared_color_error(TerminalColor::DefaultBackground, TerminalColor::Palette(0)),
             f32::INFINITY
         );
         assert_eq!(
-            RateDistortion::MOVING
+            RateDistortionParameters::MOVING
                 .squared_color_error(TerminalColor::DefaultBackground, TerminalColor::DefaultBackground),
             0.0
         );

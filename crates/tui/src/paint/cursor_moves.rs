@@ -26,12 +26,12 @@ pub(super) fn push_shortest_move(from: Option<CellPosition>, to: CellPosition, o
     };
     if from.y == to.y {
         consider(horizontal_move(from.x, to.x));
-        consider(move_with_return(&[], to.x));
+        consider(move_sequence_with_return(&[], to.x));
     } else if from.y < to.y {
         let down = usize::from(to.y - from.y);
         // A line feed's effect depends on the tty's modes, so it always follows a carriage return.
         if down <= 8 {
-            consider(move_with_return(&vec![b'\n'; down], to.x));
+            consider(move_sequence_with_return(&vec![b'\n'; down], to.x));
         }
         if from.x == to.x {
             consider(csi_with_count(to.y - from.y, b'B'));
@@ -61,7 +61,7 @@ fn horizontal_move(from: u16, to: u16) -> Vec<u8> {
 }
 
 /// Carriage return, line feeds, then movement to the right.
-fn move_with_return(down: &[u8], column: u16) -> Vec<u8> {
+fn move_sequence_with_return(down: &[u8], column: u16) -> Vec<u8> {
     let mut bytes = vec![b'\r'];
     bytes.extend_from_slice(down);
     if column > 0 {

@@ -60,9 +60,9 @@ pub struct Painter {
     links: UrlTable,
     budget: FirstPreviewByteBudget,
     /// Remaining drawing steps, in order.
-    parts: vec::IntoIter<RowDrawStep>,
+    parts: vec::IntoIter<RowLayerToDraw>,
     /// The drawing step in progress.
-    part: Option<RowDrawStep>,
+    part: Option<RowLayerToDraw>,
     strokes: vec::IntoIter<CellRun>,
     /// Drawing progress for each row of the preview.
     rows: Vec<PreviewRowProgress>,
@@ -71,7 +71,7 @@ pub struct Painter {
 
 /// A step in drawing the screen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum RowDrawStep {
+enum RowLayerToDraw {
     /// Draw a row's text.
     Text(u16),
     /// Draw a row of the preview.
@@ -106,7 +106,7 @@ impl Painter {
             can_repeat: false,
             screen: None,
             memory: FirstPreviewCells::default(),
-            wanted: TargetScreen::without_cells(depth),
+            wanted: TargetScreen::empty(depth),
             links: UrlTable::default(),
             budget: FirstPreviewByteBudget::default(),
             parts: Vec::new().into_iter(),
@@ -167,10 +167,10 @@ impl Painter {
     fn queue_all_draw_steps(&mut self) {
         let mut rows: Vec<u16> = self.wanted.rows_center_outward().collect();
         rows.sort_by_key(|y| self.rows[usize::from(*y)].aim);
-        let words = (0..self.wanted.rows).map(RowDrawStep::Text);
+        let words = (0..self.wanted.rows).map(RowLayerToDraw::Text);
         let later = (self.wanted.later.top()..self.wanted.later.bottom().min(self.wanted.rows))
-            .map(RowDrawStep::DelayedText);
-        let picture = rows.into_iter().map(RowDrawStep::Preview);
+            .map(RowLayerToDraw::DelayedText);
+        let picture = rows.into_iter().map(RowLayerToDraw::Preview);
         self.parts = words.chain(picture).chain(later).collect::<Vec<_>>().into_iter();
         self.part = None;
         self.strokes = Vec::new().into_iter();
@@ -201,14 +201,14 @@ impl Painter {
                 if !screen.draw_stroke_if_output_fits(stroke, &self.links, &mut slice) {
                     return slice.bytes;
                 }
-                if let (Some(RowDrawStep::Preview(_)), CellRun::Mosaic { at, count, .. }) =
+                if let (Some(RowLayerToDraw::Preview(_)), CellRun::Mosaic { at, count, .. }) =
                     (self.part, stroke)
                 {
                     self.memory.record_drawn_cells(*at, *count);
                 }
                 self.strokes.next();
             }
-            if let Some(RowDrawStep::Preview(y)) = self.part {
+            if let Some(RowLayerToDraw::Preview(y)) = self.part {
                 self.memory.mark_row_as_drawn(y);
                 self.rows[usize::from(y)] = PreviewRowProgress { aim: self.aim, is_done: true };
             }
@@ -218,21 +218,21 @@ impl Painter {
             }
             self.part = self.parts.next();
             let strokes = match self.part {
-                Some(RowDrawStep::Text(y)) => {
+                Some(RowLayerToDraw::Text(y)) => {
                     words::plan_text_row(screen, &self.wanted, y, ScreenRegion::Text)
                 }
-                Some(RowDrawStep::DelayedText(y)) => {
+                Some(RowLayerToDraw::DelayedText(y)) => {
                     words::plan_text_row(screen, &self.wanted, y, ScreenRegion::DelayedText)
                 }
-                Some(RowDrawStep::Preview(y))
+                Some(RowLayerToDraw::Preview(y))
                     if self.rows[usize::from(y)].is_done && !screen.is_row_damaged(y) =>
                 {
                     Vec::new()
                 }
-                Some(RowDrawStep::Preview(y)) if self.wanted.uses_ascii_ramp() => {
+                Some(RowLayerToDraw::Preview(y)) if self.wanted.uses_ascii_ramp() => {
                     words::plan_text_row(screen, &self.wanted, y, ScreenRegion::Preview)
                 }
-                Some(RowDrawStep::Preview(y)) => preview_rows::plan_preview_row(
+                Some(RowLayerToDraw::Preview(y)) => preview_rows::plan_preview_row(
                     screen,
                     &self.wanted,
                     &self.memory,

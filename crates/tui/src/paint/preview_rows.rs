@@ -1,7 +1,7 @@
 //! Draws the preview as close to its target as the byte budget allows.
 
 use super::cell::CellContent;
-use super::cost_model::RateDistortion;
+use super::cost_model::RateDistortionParameters;
 use super::cursor_moves::CellPosition;
 use super::fidelity::PreviewFidelity;
 use super::row_optimizer::{CellDrawOp, PlannedRow, RowStart, WantedAndShownCell, plan_row};
@@ -23,12 +23,12 @@ const MAX_BYTE_COST: f32 = 4000.0;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FirstPreviewByteBudget {
     bytes: u32,
-    model: RateDistortion,
+    model: RateDistortionParameters,
 }
 
 impl Default for FirstPreviewByteBudget {
     fn default() -> Self {
-        Self { bytes: 0, model: RateDistortion::MOVING }
+        Self { bytes: 0, model: RateDistortionParameters::MOVING }
     }
 }
 
@@ -73,9 +73,9 @@ pub(super) fn plan_preview_row(
         is_at_start: screen.cursor == Some(CellPosition { x: columns.start, y }),
     };
     let row = match wanted.fidelity {
-        PreviewFidelity::Still => plan_row(&targets, start, RateDistortion::EXACT),
-        PreviewFidelity::Following => plan_row(&targets, start, RateDistortion::ALL),
-        PreviewFidelity::Moving => plan_row(&targets, start, RateDistortion::MOVING),
+        PreviewFidelity::Still => plan_row(&targets, start, RateDistortionParameters::EXACT),
+        PreviewFidelity::Following => plan_row(&targets, start, RateDistortionParameters::ALL),
+        PreviewFidelity::Moving => plan_row(&targets, start, RateDistortionParameters::MOVING),
         PreviewFidelity::First => budget.plan_row_in_budget(&targets, start),
     };
     let stroke = |op: CellDrawOp| CellRun::Mosaic {

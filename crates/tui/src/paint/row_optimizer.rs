@@ -9,7 +9,7 @@ mod cell_drawing;
 
 use super::candidates::{PartColorCandidates, candidate_colors_for_run_start};
 use super::cell::{ForegroundParts, TwoPartColorCell};
-use super::cost_model::RateDistortion;
+use super::cost_model::RateDistortionParameters;
 use super::terminal_color::{ColorLayer, TerminalColor};
 use beam::{BEAM_WIDTH, CursorDistance, RowPrefixPlan, SearchBeam, color_pair_key};
 use cell_drawing::ColorChangesToTry;
@@ -53,7 +53,11 @@ pub(super) struct PlannedRow {
 }
 
 /// Finds the cheapest path through a row of cells.
-pub(super) fn plan_row(targets: &[WantedAndShownCell], start: RowStart, model: RateDistortion) -> PlannedRow {
+pub(super) fn plan_row(
+    targets: &[WantedAndShownCell],
+    start: RowStart,
+    model: RateDistortionParameters,
+) -> PlannedRow {
     let gap = if start.is_at_start { CursorDistance::Cells(0) } else { CursorDistance::Far };
     let RowStart { fg, bg, .. } = start;
     let first = RowPrefixPlan {
@@ -80,13 +84,13 @@ fn extend_plans(
     last: &[RowPrefixPlan],
     target: WantedAndShownCell,
     wanted: &[Option<TwoPartColorCell>],
-    model: RateDistortion,
+    model: RateDistortionParameters,
 ) -> Vec<RowPrefixPlan> {
     let mut beam = SearchBeam { paths: Vec::with_capacity(BEAM_WIDTH), limit: MAX_BYTES * model.byte };
     let leave = match (target.wanted, target.shown) {
         (None, _) => 0.0,
         (Some(wanted), Some(shown)) => shown
-            .overlapping_color_pairs(wanted)
+            .color_overlaps_with(wanted)
             .map(|(shown, wanted, part)| part * model.squared_color_error(shown, wanted))
             .sum(),
         (Some(_), None) => f32::INFINITY,

@@ -168,5 +168,5 @@ fn max_channel_difference_between_cells(a: TwoPartColorCell, b: TwoPartColorCell
         (Some(a), Some(b)) => a.iter().zip(b).map(|(a, b)| a.abs_diff(b)).max().unwrap_or(0),
         _ => u8::MAX,
     };
-    a.overlapping_color_pairs(b).map(|(a, b, _)| one(a, b)).max().unwrap_or(0)
+    a.color_overlaps_with(b).map(|(a, b, _)| one(a, b)).max().unwrap_or(0)
 }

@@ -31,7 +31,7 @@ pub(super) enum ScreenRegion {
 
 impl TargetScreen {
     /// A target screen without cells.
-    pub(super) fn without_cells(depth: ColorDepth) -> Self {
+    pub(super) fn empty(depth: ColorDepth) -> Self {
         Self::new(&Buffer::empty(Rect::ZERO), Rect::ZERO, PreviewFidelity::Still, depth)
     }
 

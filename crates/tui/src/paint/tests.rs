@@ -57,7 +57,7 @@ impl TestTerminal {
             let cell = self.terminal.screen().cell(y, x).expect("a cell");
             match (look, cell_content(cell)) {
                 (CellContent::Mosaic(a), CellContent::Mosaic(b)) => {
-                    for (a, b, _) in a.overlapping_color_pairs(b) {
+                    for (a, b, _) in a.color_overlaps_with(b) {
                         largest =
                             largest.max(distance(a, b).unwrap_or_else(|| panic!("{x},{y}: {a:?} {b:?}")));
                     }

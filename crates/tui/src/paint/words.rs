@@ -25,7 +25,7 @@ pub(super) fn plan_text_row(
         if screen.content(at) == look || wanted.region_at(x, y) != region {
             continue;
         }
-        if let Some(stroke) = run_from_cell(at, look) {
+        if let Some(stroke) = single_cell_run(at, look) {
             bridge_gap(screen, &mut strokes, at);
             strokes.push(stroke);
         }
@@ -33,7 +33,7 @@ pub(super) fn plan_text_row(
     replace_blanks_with_erase(wanted, y, &strokes)
 }
 
-fn run_from_cell(at: CellPosition, look: &CellContent) -> Option<CellRun> {
+fn single_cell_run(at: CellPosition, look: &CellContent) -> Option<CellRun> {
     match look {
         CellContent::Text(text) => Some(CellRun::Text { at, text: text.clone() }),
         CellContent::Mosaic(mosaic) => {

@@ -16,7 +16,7 @@ pub(super) use self::overlays::{BlockingErrors, Message, OverlayState, PaneState
 pub(super) use self::preview::ImageViewState;
 pub(super) use self::request::{CameraStepStatus, ImageProvenance, RequestState};
 pub(super) use self::saving::{SavedFilesState, SceneImageProgress, UndisplayedChange, WrittenFile};
-pub(super) use self::selection::{MousePress, PickPurpose, PointerState};
+pub(super) use self::selection::{HeldMousePress, PickPurpose, PointerState};
 pub(super) use self::work::{AssetProgressBar, RenderState, RequestStatus, WorkState};
 use super::color::{AnsiColors, ColorDepth};
 use super::event::WindowSize;

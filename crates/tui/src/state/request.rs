@@ -212,7 +212,7 @@ impl RequestState {
 
     /// Lists camera settings that changed in the scene file after the camera was moved with keys, with their
     /// current values.
-    pub(crate) fn scene_camera_edits_since_move(&self) -> Vec<String> {
+    pub(crate) fn file_camera_changes_since_move(&self) -> Vec<String> {
         let Some((own, moved)) = self.scene_camera().zip(self.current_camera()) else { return Vec::new() };
         let from = &self.moved_from;
         let of_pose = |key: &str, of: fn(&Pose) -> DVec3| {

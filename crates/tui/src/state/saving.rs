@@ -121,7 +121,7 @@ impl SavedFilesState {
     }
 
     /// Whether all files were written before the scene was last saved.
-    pub(crate) fn are_images_outdated(&self) -> bool {
+    pub(crate) fn are_images_older_than_scene(&self) -> bool {
         self.written.iter().all(|written| written.generation < self.saved_at)
     }
 

@@ -5,7 +5,7 @@ use crate::pipeline::protocol::NormalizedPosition;
 
 /// A left button press on the image.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct MousePress {
+pub(crate) struct HeldMousePress {
     /// Current column of the mouse.
     pub column: u16,
     /// Current row of the mouse.
@@ -26,7 +26,7 @@ pub(crate) enum PickPurpose {
 /// State of the mouse, the crosshair and the inspected object.
 pub(crate) struct PointerState {
     pub is_mouse_on: bool,
-    pub press: Option<MousePress>,
+    pub press: Option<HeldMousePress>,
     /// Whether the next click sets the focus.
     pub is_focusing: bool,
     /// Whether the next drag selects the region to render first.

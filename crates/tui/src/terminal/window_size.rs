@@ -16,8 +16,9 @@ pub(crate) fn query_window_size(cell_aspect: Option<f32>) -> WindowSize {
         Ok(size) => clamp_window_size(WindowSize {
             columns: size.columns,
             rows: size.rows,
-            cell_aspect: cell_aspect
-                .unwrap_or_else(|| cell_aspect_ratio((size.columns, size.rows), (size.width, size.height))),
+            cell_aspect: cell_aspect.unwrap_or_else(|| {
+                cell_height_to_width_ratio((size.columns, size.rows), (size.width, size.height))
+            }),
             cell_pixels: cell_size_from_window((size.columns, size.rows), (size.width, size.height)),
         }),
         Err(_) => {
@@ -48,7 +49,7 @@ fn clamp_window_size(window: WindowSize) -> WindowSize {
 
 /// Height-to-width ratio of a cell. Reported pixel sizes are often zero or implausible. Values within 3% of 2
 /// are rounded to 2 so that previews need no scaling.
-fn cell_aspect_ratio(cells: (u16, u16), pixels: (u16, u16)) -> f32 {
+fn cell_height_to_width_ratio(cells: (u16, u16), pixels: (u16, u16)) -> f32 {
     let width = f32::from(pixels.0) / f32::from(cells.0);
     let height = f32::from(pixels.1) / f32::from(cells.1);
     let aspect = height / width;
@@ -68,11 +69,11 @@ mod tests {
 
     #[test]
     fn implausible_cell_aspects_are_ignored() {
-        assert_eq!(cell_aspect_ratio((80, 24), (80 * 8, 24 * 18)), 2.25);
-        assert_eq!(cell_aspect_ratio((80, 24), (0, 0)), 2.0);
-        assert_eq!(cell_aspect_ratio((0, 0), (640, 480)), 2.0);
-        assert_eq!(cell_aspect_ratio((80, 24), (80, 24)), 2.0);
-        assert_eq!(cell_aspect_ratio((100, 50), (1000, 1010)), 2.0);
+        assert_eq!(cell_height_to_width_ratio((80, 24), (80 * 8, 24 * 18)), 2.25);
+        assert_eq!(cell_height_to_width_ratio((80, 24), (0, 0)), 2.0);
+        assert_eq!(cell_height_to_width_ratio((0, 0), (640, 480)), 2.0);
+        assert_eq!(cell_height_to_width_ratio((80, 24), (80, 24)), 2.0);
+        assert_eq!(cell_height_to_width_ratio((100, 50), (1000, 1010)), 2.0);
     }
 
     #[test]

@@ -52,16 +52,16 @@ fn end(ui: &mut TestUi, unchanged: bool, seconds: f64, of_image: f64) {
 #[test]
 fn fixing_a_typo_is_not_an_edit() {
     let mut ui = TestUi::from_state(state(120, 40));
-    ui.save_scene("shininess = 60");
+    ui.simulate_scene_save("shininess = 60");
     ui.finish_render(RED);
-    ui.save_scene("shininess = 6");
+    ui.simulate_scene_save("shininess = 6");
     ui.report_scene_read();
     preview(&mut ui, "dull", BLUE, true);
     end(&mut ui, false, 1.0, 1.0);
     save_broken_scene(&mut ui);
     // The last valid scene is shown again, possibly with different dithering.
     preview(&mut ui, "dull", GREEN, true);
-    ui.save_scene("shininess = 6");
+    ui.simulate_scene_save("shininess = 6");
     ui.report_scene_read();
     preview(&mut ui, "dull", GREEN, true);
     end(&mut ui, true, 0.0, 1.0);
@@ -82,11 +82,11 @@ fn fixing_a_typo_is_not_an_edit() {
 #[test]
 fn editing_a_comment_adds_no_entry() {
     let mut ui = TestUi::from_state(state(120, 40));
-    ui.save_scene("a = 1 # one");
+    ui.simulate_scene_save("a = 1 # one");
     ui.report_scene_read();
     preview(&mut ui, "first", RED, true);
     end(&mut ui, false, 1.0, 1.0);
-    ui.save_scene("a = 1 # two");
+    ui.simulate_scene_save("a = 1 # two");
     ui.report_scene_read();
     preview(&mut ui, "first", BLUE, true);
     end(&mut ui, true, 0.0, 1.0);
@@ -98,15 +98,15 @@ fn editing_a_comment_adds_no_entry() {
 #[test]
 fn editing_the_output_path_adds_no_entry() {
     let mut ui = TestUi::from_state(state(120, 40));
-    ui.save_scene("camera.fov = 40");
+    ui.simulate_scene_save("camera.fov = 40");
     ui.report_scene_read();
     show_preview(&mut ui, "narrow", RED, true);
     end(&mut ui, false, 1.0, 1.0);
-    ui.save_scene("camera.fov = 44");
+    ui.simulate_scene_save("camera.fov = 44");
     ui.report_scene_read();
     show_preview(&mut ui, "wide", BLUE, true);
     end(&mut ui, false, 1.0, 1.0);
-    ui.save_scene("camera.fov = 44\nrender.output = \"other.png\"");
+    ui.simulate_scene_save("camera.fov = 44\nrender.output = \"other.png\"");
     ui.report_scene_read();
     show_preview(&mut ui, "wide", BLUE, true);
     let generation = ui.state.request.generation;
@@ -131,7 +131,7 @@ fn editing_the_output_path_adds_no_entry() {
 #[test]
 fn resumed_render_time_is_cumulative() {
     let mut ui = TestUi::from_state(state(120, 40));
-    ui.save_scene("a = 1");
+    ui.simulate_scene_save("a = 1");
     ui.report_scene_read();
     preview(&mut ui, "first", RED, true);
     end(&mut ui, false, 5.8, 5.8);
@@ -140,7 +140,7 @@ fn resumed_render_time_is_cumulative() {
     preview(&mut ui, "first", BLUE, false);
     save_broken_scene(&mut ui);
     preview(&mut ui, "first", GREEN, false);
-    ui.save_scene("a = 1");
+    ui.simulate_scene_save("a = 1");
     ui.report_scene_read();
     preview(&mut ui, "first", GREEN, false);
     let generation = ui.state.request.generation;
@@ -177,9 +177,9 @@ const FINISHED: LastValidSceneRenderOutcome = LastValidSceneRenderOutcome::Finis
 /// Finishes a render, makes an edit, and saves a typo while the edit is being rendered.
 fn typo_during_a_render() -> TestUi {
     let mut ui = TestUi::from_state(state(120, 40));
-    ui.save_scene("shininess = 60");
+    ui.simulate_scene_save("shininess = 60");
     ui.finish_render(RED);
-    ui.save_scene("shininess = 6");
+    ui.simulate_scene_save("shininess = 6");
     ui.report_scene_read();
     show_preview(&mut ui, "dull", BLUE, false);
     save_broken_scene(&mut ui);
@@ -208,13 +208,13 @@ fn render_of_last_valid_scene_is_counted_once() {
         ui.press_character(key);
     }
     newest(&mut ui);
-    ui.save_scene("shininess = 6");
+    ui.simulate_scene_save("shininess = 6");
     ui.report_scene_read();
     show_preview(&mut ui, "dull", BLUE, true);
     end(&mut ui, true, 0.0, 1.0);
     newest(&mut ui);
     assert!(ui.screen_text().contains("unchanged · render 2"), "{}", ui.screen_text());
-    ui.save_scene("shininess = 5");
+    ui.simulate_scene_save("shininess = 5");
     ui.report_scene_read();
     show_preview(&mut ui, "duller", RED, true);
     end(&mut ui, false, 1.0, 1.0);
@@ -237,7 +237,7 @@ fn stopped_render_of_last_valid_scene_is_marked() {
 #[test]
 fn render_of_last_valid_scene_is_numbered() {
     let mut ui = TestUi::from_state(state(120, 40));
-    ui.save_scene("shininess = 60");
+    ui.simulate_scene_save("shininess = 60");
     ui.report_scene_read();
     show_preview(&mut ui, "bright", RED, true);
     end(&mut ui, false, 1.0, 1.0);
@@ -328,7 +328,7 @@ fn entries_are_numbered_by_render() {
 #[test]
 fn age_counts_from_the_last_improvement() {
     let mut ui = TestUi::from_state(state(120, 40));
-    ui.save_scene("shininess = 60");
+    ui.simulate_scene_save("shininess = 60");
     ui.report_scene_read();
     show_preview(&mut ui, "bright", RED, false);
     ui.advance_clock(8000);
@@ -336,7 +336,7 @@ fn age_counts_from_the_last_improvement() {
     ui.advance_clock(3000);
     // Showing an image again, for example at a different size, does not change its age.
     show_preview(&mut ui, "bright", GREEN, true);
-    ui.save_scene("shininess = 6");
+    ui.simulate_scene_save("shininess = 6");
     ui.report_scene_read();
     show_preview(&mut ui, "dull", BLUE, false);
     ui.advance_clock(2000);
@@ -382,7 +382,7 @@ fn reset_settings_are_listed_together() {
 fn d_and_f_report_a_pinhole_camera() {
     for text in ["[camera]\nfov = 40", "[camera]\naperture = 0.0"] {
         let mut ui = TestUi::new();
-        ui.save_scene(text);
+        ui.simulate_scene_save(text);
         ui.report_scene_read();
         ui.state.request.effective = Some(EffectiveSettingsSummary { dof: false, ..effective_settings() });
         ui.state.request.own.as_mut().expect("a scene").camera.aperture = 0.0;

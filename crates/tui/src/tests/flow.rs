@@ -64,11 +64,11 @@ fn first_change_is_timed_from_the_save() {
     ui.now += Duration::from_millis(20);
     ui.handle_event(Event::FirstPreviewSent { generation: 2 });
     ui.worker_event(done_event(2, Vec::new(), false));
-    assert!(ui.screen_text().contains(&messages::save_to_screen_time("23 ms")), "{}", ui.screen_text());
+    assert!(ui.screen_text().contains(&messages::save_to_screen_text("23 ms")), "{}", ui.screen_text());
     ui.now += Duration::from_millis(20);
     ui.handle_event(Event::FirstPreviewSent { generation: 2 });
     assert!(
-        !ui.state.dirty && ui.screen_text().contains(&messages::save_to_screen_time("23 ms")),
+        !ui.state.dirty && ui.screen_text().contains(&messages::save_to_screen_text("23 ms")),
         "measured once"
     );
 }

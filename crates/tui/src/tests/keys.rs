@@ -89,7 +89,7 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
             let wanted = if action == Action::NextView { ViewMode::Normal } else { ViewMode::Error };
             let request = sent_render_request(&effects).expect("a request");
             assert_eq!((request.overrides.view, request.write), (Some(wanted), WriteRequirement::No));
-            assert!(ui.screen_text().contains(&messages::view_chosen(wanted.name())));
+            assert!(ui.screen_text().contains(&messages::view_mode_chosen(wanted.name())));
         }
         Action::OrbitLeft | Action::OrbitRight | Action::OrbitUp | Action::OrbitDown => {
             let moved = requested_pose(&ui.press_key(key)).position - DVec3::Y;
@@ -372,7 +372,7 @@ fn resuming_is_reported_with_other_messages() {
     for (key, words) in [
         ('s', messages::RESUMED.to_owned()),
         ('r', messages::RESUMED.to_owned()),
-        ('v', messages::view_chosen("normal")),
+        ('v', messages::view_mode_chosen("normal")),
     ] {
         let mut ui = TestUi::new();
         ui.press_character(' ');

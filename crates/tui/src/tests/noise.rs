@@ -3,13 +3,13 @@
 use super::RED;
 use crate::event::Event;
 use crate::fixtures::*;
-use crate::pipeline::protocol::{self, NoisePrediction, RenderProgress};
+use crate::pipeline::protocol::{self, NoiseAndTimeToNextLevel, RenderProgress};
 
 #[test]
 fn noise_is_shown_during_a_render() {
     let mut ui = TestUi::new();
     ui.worker_event(protocol::Event::Started { generation: 1 });
-    let noise = Some(NoisePrediction { now: 0.021, seconds: 1.0, next: Some((0.01, 14.0)) });
+    let noise = Some(NoiseAndTimeToNextLevel { now: 0.021, seconds: 1.0, next: Some((0.01, 14.0)) });
     let progress = RenderProgress { noise, ..render_progress(0.5, Some(20.0)) };
     ui.worker_event(protocol::Event::Progress { generation: 1, progress });
     for (columns, rows, words) in [

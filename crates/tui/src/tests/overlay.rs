@@ -272,7 +272,7 @@ fn view_list_marks_hidden_views() {
     ui.finish_render(RED);
     ui.press_character('v');
     let text = ui.screen_text();
-    assert!(!text.contains(['▴', '▾']) && text.contains(&messages::view_chosen("normal")), "{text}");
+    assert!(!text.contains(['▴', '▾']) && text.contains(&messages::view_mode_chosen("normal")), "{text}");
 }
 
 #[test]

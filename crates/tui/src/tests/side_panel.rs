@@ -9,7 +9,7 @@ use crate::event::{Effect, Event, KeyPress, MouseEvent, MouseEventKind};
 use crate::fixtures::*;
 use crate::graphics::ImageProtocol;
 use crate::messages;
-use crate::pipeline::protocol::{self, NoisePrediction, PreviewUpdate, RenderProgress};
+use crate::pipeline::protocol::{self, NoiseAndTimeToNextLevel, PreviewUpdate, RenderProgress};
 use crate::pipeline::settings::{EffectiveSettingsSummary, Overrides};
 use crate::preview_style::PreviewStyle;
 use crate::terminal_replies::TerminalReply;
@@ -38,7 +38,7 @@ fn rendered(ui: &mut TestUi, error: f32) {
     }));
     for step in 0..=40 {
         let seconds = 10_f64.powf(f64::from(step) / 20.0);
-        let noise = Some(NoisePrediction { now: 0.1 / seconds.sqrt(), seconds, next: None });
+        let noise = Some(NoiseAndTimeToNextLevel { now: 0.1 / seconds.sqrt(), seconds, next: None });
         let progress = RenderProgress { elapsed_seconds: seconds, noise, ..render_progress(0.5, None) };
         ui.worker_event(protocol::Event::Progress { generation, progress });
     }
@@ -54,7 +54,7 @@ fn rendered(ui: &mut TestUi, error: f32) {
 /// Saves the scene with each of these texts, one after the other.
 fn edited(ui: &mut TestUi, edits: &[(&str, [u8; 3])]) {
     for (text, color) in edits {
-        ui.save_scene(text);
+        ui.simulate_scene_save(text);
         ui.finish_render(*color);
     }
 }
@@ -150,7 +150,7 @@ fn history_lists_changes_and_opens_on_click() {
 
 /// Saves the scene and starts its render. If `color` is set, shows a preview in that color.
 fn start_render(ui: &mut TestUi, text: &str, color: Option<[u8; 3]>) {
-    ui.save_scene(text);
+    ui.simulate_scene_save(text);
     ui.report_scene_read();
     color.into_iter().for_each(|color| show(ui, color));
 }

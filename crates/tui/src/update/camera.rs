@@ -3,12 +3,14 @@
 
 use std::path::PathBuf;
 
-use super::notices::{only_show_until_key, show_keyboard_change_notice, show_notice, show_notice_only};
+use super::notices::{
+    show_keyboard_change_notice, show_notice, show_notice_only, show_until_key_without_effects,
+};
 use super::request::request_render;
-use crate::camera::{dollied, orbited, zoomed};
+use crate::camera::{dollied, orbited, zoomed_projection};
 use crate::event::Effect;
 use crate::messages;
-use crate::pipeline::protocol::{CameraSaveResult, Command, MovedCamera};
+use crate::pipeline::protocol::{CameraSaveResult, Command, UserMovedCamera};
 use crate::pipeline::settings::CameraOverrides;
 use crate::scene::description::{Pose, Projection, is_same_distance};
 use crate::scene::sanitize::escape_invisible_chars;
@@ -50,7 +52,7 @@ pub(super) fn dolly(state: &mut State, steps: f64) -> Vec<Effect> {
         return show_notice_only(state, if steps > 0.0 { messages::CLOSEST } else { messages::FARTHEST });
     }
     let factor = pose.distance() / view.pose.distance();
-    if let height @ Some(_) = zoomed(view.projection, own.projection, factor).view_height() {
+    if let height @ Some(_) = zoomed_projection(view.projection, own.projection, factor).view_height() {
         state.request.toggles.camera.view_height = height;
     }
     move_camera(state, |_| pose)
@@ -61,7 +63,7 @@ pub(super) fn widen_field_of_view(state: &mut State, steps: f64) -> Vec<Effect> 
     let Some((view, own)) = state.request.current_camera().zip(state.request.scene_camera()) else {
         return show_no_scene_notice(state);
     };
-    let projection = zoomed(view.projection, own.projection, libm::pow(ZOOM_FACTOR, steps));
+    let projection = zoomed_projection(view.projection, own.projection, libm::pow(ZOOM_FACTOR, steps));
     if projection == view.projection {
         let limit = match projection {
             Projection::Perspective { fov } | Projection::Fisheye { fov } => messages::fov_limit(fov),
@@ -137,16 +139,19 @@ pub(super) fn save_camera(state: &mut State) -> Vec<Effect> {
     if !state.request.toggles.camera.has_changes() && !is_set && !state.request.is_model() {
         return show_notice_only(state, messages::NOTHING_TO_KEEP);
     }
-    let saved = state.request.scene_camera_edits_since_move();
+    let saved = state.request.file_camera_changes_since_move();
     // Models do not contain a camera that could be overwritten.
     if !saved.is_empty() && !state.request.is_model() {
         // The message below lists the saved values, so they cause no further conflict.
         state.request.reset_move_origin_to_scene_camera();
         let saved = saved.join(", ");
-        return only_show_until_key(state, &format!("error: {saved} {}", messages::CAMERA_CONFLICT));
+        return show_until_key_without_effects(
+            state,
+            &format!("error: {saved} {}", messages::CAMERA_CONFLICT),
+        );
     }
     state.saving.is_camera_of_newest = state.preview.history.is_viewing_older();
-    vec![Effect::Send(Command::KeepCamera(Box::new(MovedCamera { camera, own })))]
+    vec![Effect::Send(Command::KeepCamera(Box::new(UserMovedCamera { camera, own })))]
 }
 
 /// Handles the result of writing the camera. If the scene now uses this camera, the camera no longer counts
@@ -160,7 +165,10 @@ pub(super) fn handle_camera_save_result(
         Err(why) => {
             state.saving.camera_refused = Some(state.now);
             state.saving.has_scene_of_model |= state.request.is_model();
-            return only_show_until_key(state, &format!("error: {}", escape_invisible_chars(&why)));
+            return show_until_key_without_effects(
+                state,
+                &format!("error: {}", escape_invisible_chars(&why)),
+            );
         }
     };
     if of_model {
@@ -204,7 +212,10 @@ pub(super) fn handle_camera_save_undone(state: &mut State, outcome: Result<PathB
         Ok(path) => path,
         Err(why) => {
             state.saving.camera_refused = Some(state.now);
-            return only_show_until_key(state, &format!("error: {}", escape_invisible_chars(&why)));
+            return show_until_key_without_effects(
+                state,
+                &format!("error: {}", escape_invisible_chars(&why)),
+            );
         }
     };
     state.saving.camera_edits.pop();

@@ -41,8 +41,8 @@ pub(super) fn perform_action(state: &mut State, action: Action) -> Vec<Effect> {
         Action::ToggleDepthOfField => toggle_depth_of_field(state),
         Action::TogglePhotons => toggle_photon_mapping(state),
         Action::CycleIntegrator => cycle_integrator(state),
-        Action::NextView => step_view(state, 1),
-        Action::PreviousView => step_view(state, ViewMode::ALL.len() - 1),
+        Action::NextView => cycle_view_mode(state, 1),
+        Action::PreviousView => cycle_view_mode(state, ViewMode::ALL.len() - 1),
         Action::TogglePause => toggle_pause(state),
         Action::RenderAgain => request_render(state, true),
         Action::WriteImage => write_image_now(state),
@@ -155,7 +155,7 @@ fn toggle_photon_mapping(state: &mut State) -> Vec<Effect> {
     request_render(state, false)
 }
 
-fn step_view(state: &mut State, steps: usize) -> Vec<Effect> {
+fn cycle_view_mode(state: &mut State, steps: usize) -> Vec<Effect> {
     let current = ViewMode::ALL.iter().position(|view| *view == state.request.view_mode()).unwrap_or(0);
     select_view_and_open_list(state, ViewMode::ALL[(current + steps) % ViewMode::ALL.len()])
 }

@@ -39,7 +39,7 @@ pub(super) fn show_notice_only(state: &mut State, words: &str) -> Vec<Effect> {
 }
 
 /// Shows a message until a key is pressed and returns no effects.
-pub(super) fn only_show_until_key(state: &mut State, words: &str) -> Vec<Effect> {
+pub(super) fn show_until_key_without_effects(state: &mut State, words: &str) -> Vec<Effect> {
     show_until_key(state, words);
     Vec::new()
 }

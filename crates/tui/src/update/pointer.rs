@@ -1,6 +1,8 @@
 //! Handles the mouse and queries about image positions.
 
-use super::notices::{only_show_until_key, show_keyboard_change_notice, show_notice, show_notice_only};
+use super::notices::{
+    show_keyboard_change_notice, show_notice, show_notice_only, show_until_key_without_effects,
+};
 use super::{camera, history, overlay, region};
 use crate::event::FileLineColumn;
 use crate::event::{Effect, MouseEvent, MouseEventKind};
@@ -9,7 +11,7 @@ use crate::math::decimal::{decimal_step_for_distance, round_to_step};
 use crate::messages;
 use crate::pipeline::protocol::{Command, PickedInstance, PickedObject, PickedPixel};
 use crate::scene::sanitize::escape_invisible_chars;
-use crate::state::{MousePress, PickPurpose, State};
+use crate::state::{HeldMousePress, PickPurpose, State};
 use crate::view;
 use crate::view::layout::Layout;
 use crate::view::preview::image_position_at;
@@ -29,7 +31,7 @@ pub(super) fn handle_mouse(state: &mut State, mouse: MouseEvent) -> Vec<Effect> 
             }
             let from = image_position_at(state, column, row);
             state.selection.press =
-                is_on_preview.then_some(MousePress { column, row, has_moved: false, from });
+                is_on_preview.then_some(HeldMousePress { column, row, has_moved: false, from });
             Vec::new()
         }
         MouseEventKind::Drag => drag_region_or_orbit(state, mouse),
@@ -75,7 +77,7 @@ fn drag_region_or_orbit(state: &mut State, mouse: MouseEvent) -> Vec<Effect> {
         return Vec::new();
     }
     state.selection.press =
-        Some(MousePress { column: mouse.column, row: mouse.row, has_moved: true, ..press });
+        Some(HeldMousePress { column: mouse.column, row: mouse.row, has_moved: true, ..press });
     let degrees = TURN_ACROSS / f64::from(Layout::for_state(state).preview.width.max(1));
     camera::orbit_by_degrees(
         state,
@@ -114,7 +116,7 @@ pub(super) fn start_or_confirm_focus_pick(state: &mut State) -> Vec<Effect> {
     }
     if state.selection.is_mouse_on && !state.selection.is_focusing {
         state.selection.is_focusing = true;
-        return only_show_until_key(state, messages::CLICK_TO_FOCUS);
+        return show_until_key_without_effects(state, messages::CLICK_TO_FOCUS);
     }
     state.selection.is_focusing = false;
     send_pick_query(state, PickPurpose::Focus)

@@ -1,6 +1,6 @@
 //! The image region to render first.
 
-use super::notices::{only_show_until_key, show_notice};
+use super::notices::{show_notice, show_until_key_without_effects};
 use super::request::request_render;
 use crate::event::Effect;
 use crate::messages;
@@ -21,7 +21,7 @@ pub(super) fn start_confirm_or_clear_region(state: &mut State) -> Vec<Effect> {
     }
     if state.selection.is_mouse_on && !state.selection.is_marking {
         state.selection.is_marking = true;
-        return only_show_until_key(state, messages::DRAG_REGION);
+        return show_until_key_without_effects(state, messages::DRAG_REGION);
     }
     render_section_first(state, section_around_point(state.selection.crosshair))
 }

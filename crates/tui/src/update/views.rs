@@ -71,7 +71,7 @@ pub(super) fn select_view_and_open_list(state: &mut State, view: ViewMode) -> Ve
         let words = if is_empty {
             messages::VIEW_WITHOUT_PHOTONS.to_owned()
         } else {
-            messages::view_chosen(view.name())
+            messages::view_mode_chosen(view.name())
         };
         show_keyboard_change_notice(state, words);
     }

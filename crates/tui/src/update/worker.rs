@@ -8,7 +8,7 @@ use std::time::Duration;
 use super::diagnostics::{clear_blocking_errors, close_empty_pane, set_warnings, show_write_conflicts};
 use super::notices::{show_notice, show_until_key};
 use super::request::request_resized_preview;
-use super::written_files::{record_written_file, report_written_files, set_written_image_descriptions};
+use super::written_files::{describe_files_of_request, record_written_file, report_written_files};
 use super::{camera, pointer};
 use crate::event::{Effect, WriteFailure};
 use crate::noise_curve::NoiseCurve;
@@ -40,7 +40,7 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
             return Vec::new();
         }
         Event::Done { generation, report, .. } if generation != state.request.generation => {
-            set_written_image_descriptions(state, generation, &report);
+            describe_files_of_request(state, generation, &report);
             return Vec::new();
         }
         event => event,
@@ -61,7 +61,7 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
             let pinhole = state.request.combined_overrides().dof == Some(true) && !settings.dof;
             state.request.effective = Some(*settings);
             clear_blocking_errors(state);
-            state.preview.history.mark_scene_edits_read();
+            state.preview.history.record_scene_read();
             if pinhole {
                 show_notice(state, messages::PINHOLE);
             }

@@ -77,7 +77,7 @@ fn is_scene_image_written(state: &State, generation: u64) -> bool {
 }
 
 /// Adds a description to the files that contain a finished request's image.
-pub(super) fn set_written_image_descriptions(state: &mut State, generation: u64, report: &Report) {
+pub(super) fn describe_files_of_request(state: &mut State, generation: u64, report: &Report) {
     let base = state.request.base_view_mode();
     let has_image = |written: &&mut WrittenFile| written.generation == generation && !written.is_unfinished;
     for written in state.saving.written.iter_mut().filter(has_image) {

@@ -102,7 +102,7 @@ fn plot_noise_curve(state: &State, points: &[(f64, f64)], area: Rect, buffer: &m
     let dataset = |data, tone| {
         Dataset::default()
             .data(data)
-            .marker(select_chart_marker(state))
+            .marker(chart_marker_style(state))
             .graph_type(GraphType::Line)
             .style(style(tone))
     };
@@ -123,7 +123,7 @@ fn plot_noise_curve(state: &State, points: &[(f64, f64)], area: Rect, buffer: &m
 }
 
 /// The chart's marker: Braille dots, if the terminal is likely to support them.
-fn select_chart_marker(state: &State) -> Marker {
+fn chart_marker_style(state: &State) -> Marker {
     let is_simple = state.display.kind == PreviewStyle::Ascii
         || matches!(state.display.depth, ColorDepth::Ansi16 | ColorDepth::None);
     if is_simple { Marker::Dot } else { Marker::Braille }

@@ -113,7 +113,7 @@ fn draw_scene_info(state: &State, area: Rect, buffer: &mut Buffer) {
     let effective = state.request.effective.as_ref().filter(|_| !state.preview.history.is_viewing_older());
     let size = effective.map_or(String::new(), |it| format!("  {}×{}", it.width, it.height));
     let folder = if folder.is_empty() { String::new() } else { format!("{folder}/") };
-    let view = actual_pixels_label(state) + &view_label(state);
+    let view = actual_pixels_label(state) + &view_mode_label(state);
     let view = (&*view, TextRole::Strong);
     let mut pieces =
         vec![(&*folder, TextRole::Faint), (&*file, TextRole::Strong), view, (&*size, TextRole::Faint)];
@@ -129,7 +129,7 @@ fn draw_scene_info(state: &State, area: Rect, buffer: &mut Buffer) {
 }
 
 /// The view and its range of values, or an empty string for the beauty view.
-fn view_label(state: &State) -> String {
+fn view_mode_label(state: &State) -> String {
     let open = state.preview.history.viewed_older_scene_and_settings();
     let of_open = open.map(|origin| origin.toggles.view.unwrap_or_else(|| state.request.base_view_mode()));
     let view = of_open.unwrap_or_else(|| state.request.view_mode());
@@ -228,7 +228,7 @@ fn progress_or_result_variants(state: &State) -> Vec<String> {
 fn newest_render_number(state: &State) -> u64 {
     let history = &state.preview.history;
     let is_under_way = state.work.is_rendering()
-        && history.is_newest_from_request(state.request.generation)
+        && history.newest_is_from_request(state.request.generation)
         && history.is_newest_unfinished();
     state.work.renders + u64::from(is_under_way)
 }

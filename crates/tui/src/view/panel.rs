@@ -183,7 +183,7 @@ fn result_lines(state: &State, width: u16) -> Vec<StyledLine> {
         Some(RenderLimit::Samples) => lines.push(fact("stopped", "at max samples".to_owned())),
         Some(RenderLimit::Error) | None => {}
     }
-    lines.extend(status_line::save_to_screen_time(state).map(|words| vec![(words, TextRole::Faint)]));
+    lines.extend(status_line::save_to_screen_text(state).map(|words| vec![(words, TextRole::Faint)]));
     lines
 }
 

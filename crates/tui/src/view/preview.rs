@@ -71,7 +71,7 @@ pub(crate) fn image_position_at(state: &State, column: u16, row: u16) -> Option<
             x: share(column, cells.x, cells.width),
             y: share(row, cells.y, cells.height),
         };
-        shown.section.map_or(spot, |section| section.to_image_position(spot))
+        shown.section.map_or(spot, |section| section.position_in_image(spot))
     };
     cells.contains((column, row).into()).then(spot)
 }

@@ -48,8 +48,8 @@ impl AsciiRamp {
             counts[usize::from(level)] += 1;
         }
         let beyond = picture.pixels.len() / 30;
-        let low = (level_beyond_pixel_count(&counts, 0..256, beyond) * STEPS).floor() / STEPS;
-        let high = (level_beyond_pixel_count(&counts, (0..256).rev(), beyond) * STEPS).ceil() / STEPS;
+        let low = (histogram_level_at_rank(&counts, 0..256, beyond) * STEPS).floor() / STEPS;
+        let high = (histogram_level_at_rank(&counts, (0..256).rev(), beyond) * STEPS).ceil() / STEPS;
         let (low, high) = if high - low < MIN { (high.min(1.0) - MIN, high.min(1.0)) } else { (low, high) };
         Self { low: low.max(0.0), high, is_light }
     }
@@ -102,7 +102,7 @@ impl AsciiRamp {
 }
 
 /// Returns the first level by which more than `beyond` pixels have been counted.
-fn level_beyond_pixel_count(
+fn histogram_level_at_rank(
     counts: &[usize; 256],
     mut levels: impl Iterator<Item = usize>,
     beyond: usize,

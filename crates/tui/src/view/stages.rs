@@ -27,7 +27,7 @@ pub(super) fn lines_of_stage_with_full_reason(state: &State, stage: Stage, room:
     if why.is_empty() {
         return vec![line];
     }
-    if text_columns(&why) <= reason_columns(&line, room) {
+    if text_columns(&why) <= columns_left_for_reason(&line, room) {
         line.push((format!("  {why}"), TextRole::Faint));
         return vec![line];
     }
@@ -39,7 +39,7 @@ pub(super) fn lines_of_stage_with_full_reason(state: &State, stage: Stage, room:
 /// Formats a stage's symbol, name, time, time difference, and as much of the reason as fits on the same line.
 pub(super) fn stage_line_with_reason(state: &State, stage: Stage, room: u16) -> Vec<StyledLine> {
     let mut line = stage_line(state, stage, room);
-    let (why, room) = (stage_reason(state, stage), reason_columns(&line, room));
+    let (why, room) = (stage_reason(state, stage), columns_left_for_reason(&line, room));
     if !why.is_empty() && (room >= MIN_WHY || text_columns(&why) <= room) {
         line.push((format!("  {}", truncated_text(&why, room)), TextRole::Faint));
     }
@@ -47,7 +47,7 @@ pub(super) fn stage_line_with_reason(state: &State, stage: Stage, room: u16) -> 
 }
 
 /// Number of columns available for a reason next to a stage.
-fn reason_columns(line: &StyledLine, room: u16) -> u16 {
+fn columns_left_for_reason(line: &StyledLine, room: u16) -> u16 {
     room.saturating_sub(line_width(line) + 2)
 }
 
@@ -111,7 +111,7 @@ fn stage_time_change_text(state: &State, report: &StageReport) -> String {
 
 /// Lists the stages that took a significant part of the time on one line, followed by the number of cached
 /// stages. The line is shortened to fit, and empty if even the longest stage does not fit.
-pub(super) fn stage_summary_line(state: &State, room: u16) -> StyledLine {
+pub(super) fn slowest_stages_line(state: &State, room: u16) -> StyledLine {
     let done = || state.work.stages.iter().flatten().filter(|it| it.status == Status::Done);
     let total: f64 = done().map(|it| it.seconds).sum();
     let longest = done().map(|it| it.seconds).fold(0.0, f64::max);

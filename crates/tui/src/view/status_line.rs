@@ -14,7 +14,7 @@ use super::text::{
 };
 use crate::exit_summary;
 use crate::messages;
-use crate::pipeline::protocol::{NoisePrediction, RenderProgress, SavedSceneRenderStatus};
+use crate::pipeline::protocol::{NoiseAndTimeToNextLevel, RenderProgress, SavedSceneRenderStatus};
 use crate::pipeline::words::format_mean_samples;
 use crate::preview_style::PreviewStyle;
 use crate::scene::sanitize::escape_invisible_chars;
@@ -61,7 +61,7 @@ fn status_content(state: &State) -> StatusContent {
         RequestStatus::Running { .. } => StatusContent::ProgressBar,
         RequestStatus::Done => StatusContent::Summary,
         RequestStatus::Waiting | RequestStatus::Canceled => StatusContent::Nothing,
-        RequestStatus::Broken if let Some(progress) = last_valid_scene_progress(state) => {
+        RequestStatus::Broken if let Some(progress) = last_valid_render_progress(state) => {
             StatusContent::Words(format!(
                 "{}: {} %",
                 messages::LAST_GOOD_SCENE,
@@ -88,7 +88,7 @@ pub(super) fn reserved_columns(state: &State, layout: &Layout) -> u16 {
 }
 
 /// Progress of the last valid scene's render, which continues while the file is broken.
-pub(crate) fn last_valid_scene_progress(state: &State) -> Option<&RenderProgress> {
+pub(crate) fn last_valid_render_progress(state: &State) -> Option<&RenderProgress> {
     let is_broken = matches!(state.work.activity, RequestStatus::Broken | RequestStatus::Waiting);
     state.work.progress.as_ref().filter(|progress| is_broken && progress.fraction < 1.0)
 }
@@ -121,8 +121,8 @@ fn draw_progress_bar(state: &State, layout: &Layout, area: Rect, buffer: &mut Bu
     let room = area.width.saturating_sub(text_columns(name) + text_columns(&words) + 2);
     let noise = state.work.progress.and_then(|progress| progress.noise);
     // While paused, the remaining time is unknown.
-    let noise =
-        noise.map(|noise| NoisePrediction { next: noise.next.filter(|_| !state.work.paused), ..noise });
+    let noise = noise
+        .map(|noise| NoiseAndTimeToNextLevel { next: noise.next.filter(|_| !state.work.paused), ..noise });
     let fits = |noise: &String| room >= text_columns(noise) + 3 + MIN_BAR;
     let noise = noise.and_then(|noise| noise_texts(&noise).into_iter().find(fits));
     let words = noise.map_or(words.clone(), |noise| format!("{noise} · {words}"));
@@ -148,7 +148,7 @@ fn draw_progress_bar(state: &State, layout: &Layout, area: Rect, buffer: &mut Bu
 
 /// Formats the noise as `noise 2.1 % → 1 % in about 14 s` and in a shorter variant. It is called noise rather
 /// than error because a noise-free image may still be biased.
-fn noise_texts(noise: &NoisePrediction) -> [String; 2] {
+fn noise_texts(noise: &NoiseAndTimeToNextLevel) -> [String; 2] {
     let now = format!("noise {}", format_two_digit_percent(noise.now));
     let next = noise.next.map(|(level, seconds)| {
         format!("{now} → {} in {}", format_two_digit_percent(level), format_approximate_time(seconds))
@@ -167,7 +167,7 @@ fn draw_summary(
     let of_files = written_file_pieces(state, layout);
     // Files take precedence if there is not enough space.
     let room = area.width.saturating_sub(reserved_columns(state, layout));
-    let mut pieces = stages::stage_summary_line(state, room);
+    let mut pieces = stages::slowest_stages_line(state, room);
     let comma = if pieces.is_empty() { "" } else { ", " };
     let mut is_room = |more: Vec<(String, TextRole)>| {
         let width: u16 = pieces.iter().chain(&more).map(|(text, _)| text_columns(text)).sum();
@@ -203,7 +203,7 @@ fn draw_summary(
     let used =
         put_text_right(buffer, free, &fitting.unwrap_or_default(), TextRole::Faint, state.display.depth);
     let free = Rect { width: free.width.saturating_sub(used + 2), ..free };
-    let seen = save_to_screen_time(state).filter(|_| layout.panel.is_empty()).unwrap_or_default();
+    let seen = save_to_screen_text(state).filter(|_| layout.panel.is_empty()).unwrap_or_default();
     put_text_right(buffer, free, &seen, TextRole::Faint, state.display.depth);
 }
 
@@ -267,7 +267,7 @@ pub(crate) fn unsaved_image_messages(state: &State) -> Vec<String> {
             Some(messages::saved_scene_render_interrupted(&name, floor_percent(fraction)))
         }
         (SceneImageProgress { state: SavedSceneRenderStatus::NotBegun, .. }, None, Some(name)) => {
-            let is_older = !saving.written.is_empty() && saving.are_images_outdated();
+            let is_older = !saving.written.is_empty() && saving.are_images_older_than_scene();
             is_older.then(|| messages::scene_image_outdated(&name))
         }
     };
@@ -280,8 +280,8 @@ pub(super) fn externally_changed_output_messages(state: &State) -> impl Iterator
 }
 
 /// Time between saving the file and drawing the first changed cell.
-pub(super) fn save_to_screen_time(state: &State) -> Option<String> {
-    state.saving.first_change.map(|time| messages::save_to_screen_time(&format_duration(time)))
+pub(super) fn save_to_screen_text(state: &State) -> Option<String> {
+    state.saving.first_change.map(|time| messages::save_to_screen_text(&format_duration(time)))
 }
 
 /// A hint for users who have not saved yet, or an empty string if there is nothing to save.

@@ -78,7 +78,7 @@ fn draw_entry(
     let (mark, tone) = if is_looked_at { ("▸", TextRole::Strong) } else { (" ", TextRole::Plain) };
     // The text next to the thumbnail starts in the same column with or without a mark.
     let words = EntryNumberAndChanges {
-        head: format!("{mark}{} ", render_number_label(state, *index)),
+        head: format!("{mark}{} ", entry_number_text(state, *index)),
         changes: history.describe_changes_since_previous(*index, is_entry_rendering(state, *index)),
     };
     let beside = remaining_row_area(*cells, place.width + 1);
@@ -90,7 +90,7 @@ fn draw_entry(
 }
 
 /// Number of the render that produced an entry, or a dash if the render was stopped.
-fn render_number_label(state: &State, index: usize) -> String {
+fn entry_number_text(state: &State, index: usize) -> String {
     let under_way = is_entry_rendering(state, index).then_some(state.work.renders + 1);
     state
         .preview

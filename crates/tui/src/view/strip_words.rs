@@ -37,7 +37,7 @@ pub(super) fn wrap_entry_text(words: &EntryNumberAndChanges, width: usize, rows:
     let fewer = (1..count).rev().map(ChangeDetail::First).chain([ChangeDetail::Cut]);
     let in_few = all.map(|form| (form, few));
     let in_most = all.into_iter().chain(fewer).map(|form| (form, most));
-    let lines = |form| fill_lines(&words.head, &split_changes_into_pieces(words, form, width), width);
+    let lines = |form| wrap_pieces(&words.head, &split_changes_into_pieces(words, form, width), width);
     let is_lone =
         |lines: &[String]| lines.first().is_some_and(|line| line.trim_end() == words.head.trim_end());
     let fits = |(form, rows): (ChangeDetail, usize)| {
@@ -112,7 +112,7 @@ impl UnbreakablePiece {
 /// Splits a change into pieces: the key and its values, or single words.
 fn change_pieces(change: &str, form: ChangeDetail, beside_head: usize) -> Vec<UnbreakablePiece> {
     let words = |text: &str| text.split(' ').map(UnbreakablePiece::from_text).collect::<Vec<_>>();
-    let key = |key: &str| UnbreakablePiece { text: format_key(key, form, beside_head), is_key: true };
+    let key = |key: &str| UnbreakablePiece { text: format_changed_key(key, form, beside_head), is_key: true };
     if let Some((sign @ ("+" | "−"), rest)) = change.split_once(' ') {
         let (name, value) = split_at_unquoted_space(rest).unwrap_or((rest, ""));
         let value = if value.is_empty() { Vec::new() } else { words(value) };
@@ -134,7 +134,7 @@ fn change_pieces(change: &str, form: ChangeDetail, beside_head: usize) -> Vec<Un
     }
 }
 
-fn format_key(key: &str, form: ChangeDetail, beside_head: usize) -> String {
+fn format_changed_key(key: &str, form: ChangeDetail, beside_head: usize) -> String {
     match form {
         ChangeDetail::Full | ChangeDetail::New => key.to_owned(),
         ChangeDetail::Short | ChangeDetail::First(_) => last_key_parts(key),
@@ -153,7 +153,7 @@ fn last_key_parts(key: &str) -> String {
 
 /// Fills lines with pieces. The first line starts with `head`. Pieces that are too long are broken. Keys are
 /// broken after a dot, and other pieces between words.
-fn fill_lines(head: &str, pieces: &[UnbreakablePiece], width: usize) -> Vec<String> {
+fn wrap_pieces(head: &str, pieces: &[UnbreakablePiece], width: usize) -> Vec<String> {
     let mut lines = vec![head.to_owned()];
     let mut is_behind_head = true;
     for piece in pieces {

@@ -38,7 +38,7 @@ pub(super) fn draw_panel<'a>(scene: &SceneResult, place: &PanelArea<'a>) -> Resu
     let errors = steps().flat_map(|step| [step.relmse, step.spread[0], step.spread[1]]);
     let up = LogAxis::spanning(errors.chain([noise]), legend_height_fraction(scene.methods.len()));
     let mut chart = ChartBuilder::on(place)
-        .caption(caption(scene), ("sans-serif", 20))
+        .caption(caption_text(scene), ("sans-serif", 20))
         .margin(14)
         .x_label_area_size(50)
         .y_label_area_size(80)
@@ -66,7 +66,7 @@ pub(super) fn draw_panel<'a>(scene: &SceneResult, place: &PanelArea<'a>) -> Resu
 }
 
 /// Returns the caption, without characters that are invalid in XML.
-fn caption(scene: &SceneResult) -> String {
+fn caption_text(scene: &SceneResult) -> String {
     format!("{}, {}×{}", escape_invisible_chars(&scene.scene), scene.width, scene.height)
 }
 

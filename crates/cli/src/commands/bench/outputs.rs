@@ -79,7 +79,7 @@ impl BenchOutputs {
                 format!("cannot write {}: plots are SVG files; use the extension .svg", path.display());
             return Err(OutputError::Refused { reason });
         }
-        output::check_output_path(path)
+        output::check_output_is_writable(path)
     }
 
     /// Checks that output `index`, whose resolved path is `real`, is neither an input nor another output.

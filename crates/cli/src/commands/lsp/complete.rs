@@ -128,7 +128,7 @@ fn value_items(document: &OpenDocument, kind: ValueKind, is_quoted: bool) -> Vec
     };
     let colors = || {
         let color = |name: &str| {
-            completion_item(name, CompletionItemKind::COLOR, "", quote_if_needed(name, is_quoted))
+            completion_item(name, CompletionItemKind::COLOR, "", quote_unless_quoted(name, is_quoted))
         };
         color_names().map(color).collect::<Vec<_>>()
     };
@@ -167,7 +167,7 @@ fn choice_items(list: &[ChoiceValue], is_quoted: bool) -> Vec<CompletionItem> {
             word.name,
             CompletionItemKind::ENUM_MEMBER,
             word.meaning,
-            quote_if_needed(word.name, is_quoted),
+            quote_unless_quoted(word.name, is_quoted),
         )
     };
     list.iter().map(word).collect()
@@ -184,12 +184,12 @@ fn defined_name_items(document: &OpenDocument, table: &str, is_quoted: bool) -> 
                 &name.text,
                 CompletionItemKind::REFERENCE,
                 "",
-                quote_if_needed(&name.text, is_quoted),
+                quote_unless_quoted(&name.text, is_quoted),
             )
         })
         .collect()
 }
 
-fn quote_if_needed(text: &str, is_quoted: bool) -> String {
+fn quote_unless_quoted(text: &str, is_quoted: bool) -> String {
     if is_quoted { text.to_owned() } else { crate::scene::quote_toml_string(text) }
 }

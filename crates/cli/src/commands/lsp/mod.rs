@@ -86,7 +86,7 @@ fn serve(from: &mut impl BufRead, client: &ClientWriter) -> Result<Exit, String>
         match received {
             ReceivedFrame::Invalid(answer) => client.send_error(&answer),
             ReceivedFrame::Message(Message::Request(request)) => {
-                let response = server.respond_to_request(request, &mut phase);
+                let response = server.handle_request(request, &mut phase);
                 server.send(&response.into());
             }
             ReceivedFrame::Message(Message::Notification(one)) => match (one.method.as_str(), phase) {
@@ -123,7 +123,7 @@ impl Server<'_> {
     }
 
     /// Responds to a request and updates the phase.
-    fn respond_to_request(&self, request: Request, phase: &mut ServerPhase) -> Response {
+    fn handle_request(&self, request: Request, phase: &mut ServerPhase) -> Response {
         let refused = |id, code: ErrorCode, why: &str| Response::new_err(id, code as i32, why.to_owned());
         match (request.method.as_str(), *phase) {
             (Initialize::METHOD, ServerPhase::New) => {

@@ -77,7 +77,7 @@ fn context_in_table(
     after: &str,
     is_inline: bool,
 ) -> Option<CursorContext> {
-    let of = CursorTable { info, kind: table_type(info, body) };
+    let of = CursorTable { info, kind: table_type_from_type_key(info, body) };
     let (opened, closed) = (typed.matches('{').count(), typed.matches('}').count());
     if opened > closed {
         return Some(context_in_inline_table(of, typed.rsplit_once('{').unwrap_or_default()));
@@ -219,7 +219,7 @@ fn header_name(line: &str) -> Option<&str> {
 }
 
 /// Returns the table's type: the value of its key `type`, or the default type.
-fn table_type(info: &'static TableInfo, body: &str) -> Option<&'static TableTypeInfo> {
+fn table_type_from_type_key(info: &'static TableInfo, body: &str) -> Option<&'static TableTypeInfo> {
     let named = body.split(['\n', ',', '{', '}']).find_map(|item| {
         let (key, value) = item.split_once('=')?;
         (key.trim() == "type").then(|| first_string(value)).flatten()

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use crate::control::{CancelToken, Canceled};
 use crate::output::part::{self, PartFile};
 use crate::output::{is_same_file, scene_path};
-use crate::pipeline::{files_referenced_by_assets, foreign_file_error};
+use crate::pipeline::{files_referenced_by_assets, not_a_scene_file_error};
 use crate::scene::referenced_files;
 use crate::scene::sanitize::escape_invisible_chars;
 
@@ -28,7 +28,7 @@ impl<'a> RenderInputFiles<'a> {
         let target = out.canonicalize().ok();
         let outs = [Some(out), target.as_deref()].into_iter().flatten();
         let scenes: BTreeSet<PathBuf> = outs.flat_map(|out| possible_scene_paths(parts, out)).collect();
-        let texts = scenes.iter().filter(|scene| foreign_file_error(scene).is_none());
+        let texts = scenes.iter().filter(|scene| not_a_scene_file_error(scene).is_none());
         let named = texts.flat_map(|scene| referenced_files(scene)).collect::<Vec<_>>();
         Self { parts, token, named: scenes.into_iter().chain(named).collect(), companions: OnceCell::new() }
     }
@@ -47,11 +47,11 @@ impl<'a> RenderInputFiles<'a> {
             Some(format!("the parts' scene references it ({name})"))
         };
         let by_name = || {
-            let name = part::find_render_input_that_ends_path(self.parts, path)?;
+            let name = part::find_input_that_is_path_suffix(self.parts, path)?;
             Some(format!("the parts' scene references a file with this name ({name})"))
         };
         let by_content = || {
-            let name = part::find_input_with_same_content(self.parts, path)?;
+            let name = part::find_render_input_by_content(self.parts, path)?;
             Some(format!("the parts were rendered from it ({name})"))
         };
         match by_name().or_else(|| find(&self.named)).or_else(by_content) {

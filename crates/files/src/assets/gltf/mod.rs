@@ -121,7 +121,7 @@ impl GltfFile {
     /// # Errors
     /// The image does not exist, or its bytes are out of range.
     pub fn locate_image(&self, number: usize) -> Result<ImageLocation<'_>, AssetError> {
-        self.find_image_location(number)
+        self.image_bytes_or_path(number)
             .map_err(|wrong| self.malformed_error(wrong.add_location(format!("images[{number}]"))))
     }
 
@@ -142,7 +142,7 @@ impl GltfFile {
         }
     }
 
-    fn find_image_location(&self, number: usize) -> Result<ImageLocation<'_>, GltfError> {
+    fn image_bytes_or_path(&self, number: usize) -> Result<ImageLocation<'_>, GltfError> {
         let images = &self.root.images;
         let image = images
             .get(number)

@@ -36,7 +36,7 @@ impl GltfFile {
             notes: ImportNotes::default(),
             materials: HashMap::new(),
         };
-        walk.add_all_nodes().map_err(|wrong| self.malformed_error(wrong))?;
+        walk.add_default_scene_nodes().map_err(|wrong| self.malformed_error(wrong))?;
         let SceneWalk { mut scene, notes, .. } = walk;
         scene.notes = notes.0;
         scene.images = self.root.images.iter().map(|image| image.name.clone()).collect();
@@ -56,7 +56,7 @@ struct SceneWalk<'a> {
 }
 
 impl SceneWalk<'_> {
-    fn add_all_nodes(&mut self) -> Result<(), GltfError> {
+    fn add_default_scene_nodes(&mut self) -> Result<(), GltfError> {
         let root = &self.container.root;
         // Find the root nodes.
         let number = root.scene.unwrap_or_default();

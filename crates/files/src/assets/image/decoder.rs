@@ -42,7 +42,7 @@ pub(super) fn create_decoder<R: BufRead + Seek + 'static>(
         }
         Some(ImageFormat::OpenExr) => {
             let decoder = ExrDecoder::new(reader.into_inner(), memory_bytes)?;
-            let metadata = decoder.metadata();
+            let metadata = decoder.color_metadata();
             Ok((Box::new(decoder), metadata))
         }
         Some(ImageFormat::Hdr) => {

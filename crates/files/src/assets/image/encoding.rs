@@ -40,7 +40,7 @@ pub enum ColorTransferFunction {
 
 impl ColorTransferFunction {
     /// Interpretation of an image that has this transfer function and no alpha.
-    pub fn encoding_without_alpha(self) -> ColorEncoding {
+    pub fn encoding_of_opaque_image(self) -> ColorEncoding {
         match self {
             Self::Auto => ColorEncoding::Color,
             Self::Srgb => ColorEncoding::Srgb,

@@ -45,7 +45,7 @@ fn check_supported_type(bytes: &[u8]) -> Result<(), String> {
 
 /// Returns the offset of the transform byte in a misleading Adobe segment: one that specifies RGB in a file
 /// with a JFIF segment. JFIF implies YCbCr, and other readers give it precedence.
-pub(super) fn find_wrong_adobe_transform(bytes: &[u8]) -> Option<usize> {
+pub(super) fn wrong_adobe_transform_offset(bytes: &[u8]) -> Option<usize> {
     const ADOBE: &[u8] = b"Adobe";
     const TRANSFORM: usize = 11;
     let find = |marker: u8, name: &[u8]| {
@@ -60,7 +60,7 @@ pub(super) fn find_wrong_adobe_transform(bytes: &[u8]) -> Option<usize> {
 
 /// Changes a misleading Adobe segment to YCbCr.
 pub(super) fn fix_adobe_color_transform(bytes: &mut [u8]) {
-    if let Some(transform) = find_wrong_adobe_transform(bytes) {
+    if let Some(transform) = wrong_adobe_transform_offset(bytes) {
         bytes[transform] = 1;
     }
 }
@@ -138,11 +138,11 @@ mod tests {
             (b"\xe0JFIF\0\x01\x02", b"\xeeAdobe\0d\0\0\0\0\0", b"\xeeAdobe\0d\0\0\0\0\x01");
         for segments in [&[jfif.as_slice(), rgb][..], &[rgb, jfif]] {
             let file = file(segments);
-            let at = find_wrong_adobe_transform(&file).expect("both segments are present");
+            let at = wrong_adobe_transform_offset(&file).expect("both segments are present");
             assert_eq!(file[at - 11..=at], rgb[1..]);
         }
         for segments in [&[jfif.as_slice(), ycc][..], &[rgb], &[jfif], &[]] {
-            assert_eq!(find_wrong_adobe_transform(&file(segments)), None);
+            assert_eq!(wrong_adobe_transform_offset(&file(segments)), None);
         }
     }
 }

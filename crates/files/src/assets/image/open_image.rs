@@ -182,7 +182,7 @@ impl OpenImage {
             }
             ImageStream::Embedded(bytes) if start(bytes.get_ref()) == Some(ImageFormat::Jpeg) => {
                 jpeg::check_complete_bytes(bytes.get_ref())?;
-                if jpeg::find_wrong_adobe_transform(bytes.get_ref()).is_some() {
+                if jpeg::wrong_adobe_transform_offset(bytes.get_ref()).is_some() {
                     let mut copy = bytes.get_ref().to_vec();
                     jpeg::fix_adobe_color_transform(&mut copy);
                     self.file = ImageStream::InMemory(Cursor::new(copy));

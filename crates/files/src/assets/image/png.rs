@@ -78,7 +78,7 @@ type DecompressedProfile = Option<Vec<u8>>;
 impl<R: BufRead + Seek> PngDecoder<R> {
     /// Creates a decoder that allocates at most `memory_bytes` in addition to the pixels.
     pub(super) fn new(mut file: R, memory_bytes: u64) -> ImageResult<Self> {
-        let profile = read_profile(&mut file).map_err(ImageError::IoError)?;
+        let profile = read_icc_profile(&mut file).map_err(ImageError::IoError)?;
         let limits = png::Limits { bytes: usize::try_from(memory_bytes).unwrap_or(usize::MAX) };
         let mut decoder = png::Decoder::new_with_limits(file, limits);
         decoder.set_ignore_text_chunk(true);
@@ -229,7 +229,7 @@ fn unsupported_cicp_warning(points: png::CodingIndependentCodePoints) -> String 
 }
 
 /// Reads a file's color profile, then rewinds the file.
-fn read_profile(file: &mut (impl Read + Seek)) -> io::Result<Option<DecompressedProfile>> {
+fn read_icc_profile(file: &mut (impl Read + Seek)) -> io::Result<Option<DecompressedProfile>> {
     let profile = find_and_decompress_profile(file);
     file.seek(SeekFrom::Start(0))?;
     match profile {

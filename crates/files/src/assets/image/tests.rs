@@ -9,7 +9,7 @@ use super::messages::{
 };
 use super::metadata::profile_ignored_warning;
 use super::*;
-use crate::assets::rejection;
+use crate::assets::expect_rejection;
 use crate::materials::scalar::ChannelSelector;
 use crate::materials::texels::TexelData;
 use crate::math::Vec3;
@@ -55,7 +55,7 @@ fn warnings_of(name: &str, bytes: &[u8], encoding: ColorEncoding) -> Vec<String>
 
 /// Returns the reason why an image is rejected.
 fn error(name: &str, bytes: &[u8]) -> String {
-    rejection(load_bytes(name, bytes, ColorEncoding::Color)).1
+    expect_rejection(load_bytes(name, bytes, ColorEncoding::Color)).1
 }
 
 const PIXELS: [u8; 12] = [255, 0, 0, 0, 255, 0, 0, 0, 255, 10, 20, 30];

@@ -40,7 +40,7 @@ pub(super) fn open_with_alpha_usage<R: Read + Seek>(
         Ok(_) | Err(_) => AlphaInterpretation::Straight,
     };
     // `image` does not decode the alpha bit of 16-bit colors.
-    let has_alpha_bit = color_bits(&header) == Some(16) && alpha != AlphaInterpretation::Unused;
+    let has_alpha_bit = bits_per_color(&header) == Some(16) && alpha != AlphaInterpretation::Unused;
     let alpha = if has_alpha_bit { AlphaInterpretation::Dropped } else { alpha };
     header[DESCRIPTOR] =
         header[DESCRIPTOR] & !ALPHA_BITS | max_alpha_bits(&header).map_err(decoding_error)?;
@@ -49,7 +49,7 @@ pub(super) fn open_with_alpha_usage<R: Read + Seek>(
 }
 
 /// Returns the number of bits per color, or `None` for gray images and unknown types.
-fn color_bits(header: &[u8; HEADER]) -> Option<u8> {
+fn bits_per_color(header: &[u8; HEADER]) -> Option<u8> {
     match header[2] {
         1 | 9 => Some(header[7]),
         2 | 10 => Some(header[16]),
@@ -60,7 +60,7 @@ fn color_bits(header: &[u8; HEADER]) -> Option<u8> {
 /// Returns how many bits of each pixel may contain alpha.
 fn max_alpha_bits(header: &[u8; HEADER]) -> Result<u8, String> {
     let kind = header[2];
-    let bits = match (kind, color_bits(header)) {
+    let bits = match (kind, bits_per_color(header)) {
         (_, Some(bits)) => bits,
         (3 | 11, None) => header[16],
         _ => return Err(format!("image type {kind} is not supported; save it as PNG")),

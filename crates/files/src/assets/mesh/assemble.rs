@@ -50,7 +50,7 @@ pub(super) fn assemble_text_mesh(
     } = parsed;
     let (origin, positions) = recenter_positions(positions, &faces);
     if has_separate_corners {
-        faces.merge_coincident_vertices(&positions, source.monitor.token)?;
+        faces.merge_vertices_by_position(&positions, source.monitor.token)?;
     }
     let max_triangles = TriangleMesh::MAX_TRIANGLES as usize;
     let mut cutter = FaceTriangulator::new(&positions, &face_materials, max_triangles);
@@ -338,8 +338,8 @@ fn complete_normals(mesh: &mut TriangleMesh, token: &CancelToken) -> Result<(), 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::assets::expect_rejection;
     use crate::assets::read::Monitor;
-    use crate::assets::rejection;
     use crate::control::ignore_progress;
     use std::path::Path;
 
@@ -421,7 +421,7 @@ mod tests {
         for list in [&[&[0, 1, 2][..], &[0, 2, 3]][..], &[&[0, 1, 2, 3]]] {
             assert!(FaceTriangulator::new(&SQUARE, &[], 2).add_all_faces(&source, &faces(list)).is_ok());
             let result = FaceTriangulator::new(&SQUARE, &[], 1).add_all_faces(&source, &faces(list));
-            assert_eq!(rejection(result), (None, super::too_many_triangles_message(1)));
+            assert_eq!(expect_rejection(result), (None, super::too_many_triangles_message(1)));
         }
     }
 
@@ -450,8 +450,8 @@ mod tests {
         let parsed =
             ParsedMesh { positions, faces: faces(&[&[0, 1, 2], &[0, 1, 3]]), ..ParsedMesh::default() };
         let dropped = DroppedFaces { non_finite: 1, degenerate: 1 };
-        assert_eq!(rejection(assembled(parsed)).1, no_usable_face_message(2, dropped));
-        assert_eq!(rejection(assembled(ParsedMesh::default())).1, NO_FACES);
+        assert_eq!(expect_rejection(assembled(parsed)).1, no_usable_face_message(2, dropped));
+        assert_eq!(expect_rejection(assembled(ParsedMesh::default())).1, NO_FACES);
     }
 
     #[test]
@@ -480,6 +480,6 @@ mod tests {
             faces: faces(&[&[0, 1, 2], &[0, 1, 4]]),
             ..ParsedMesh::default()
         };
-        assert_eq!(rejection(assembled(parsed)), (None, index_out_of_range_message(2)));
+        assert_eq!(expect_rejection(assembled(parsed)), (None, index_out_of_range_message(2)));
     }
 }

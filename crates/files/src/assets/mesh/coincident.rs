@@ -13,7 +13,7 @@ const BUCKET: usize = 1 << 12;
 const BATCH: usize = 1 << 16;
 
 /// Hash and index of a vertex.
-type HashedVertex = (u32, u32);
+type VertexHashAndIndex = (u32, u32);
 
 /// Finds sets of coincident vertices, each in ascending order. The order of the sets is arbitrary but
 /// deterministic.
@@ -54,7 +54,7 @@ fn sort_into_buckets(
     hashes: &[u32],
     bits: u32,
     token: &CancelToken,
-) -> Result<(Vec<HashedVertex>, Vec<usize>), Canceled> {
+) -> Result<(Vec<VertexHashAndIndex>, Vec<usize>), Canceled> {
     let bucket = |hash: u32| (u64::from(hash) >> (32 - bits)) as usize;
     let mut ends = vec![0; 1 << bits];
     for hashes in hashes.chunks(BATCH) {
@@ -79,7 +79,7 @@ fn sort_into_buckets(
 
 /// Finds the coincident vertices in a bucket by grouping them by hash, then by position.
 fn group_coincident_in_bucket(
-    bucket: &[HashedVertex],
+    bucket: &[VertexHashAndIndex],
     positions: &[Vec3],
     token: &CancelToken,
 ) -> Result<Vec<Vec<u32>>, Canceled> {

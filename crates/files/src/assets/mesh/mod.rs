@@ -64,11 +64,11 @@ pub fn load_from_bytes(
 }
 
 /// Returns the functions for the format that the extension determines.
-fn parse_and_read_functions(path: &Path) -> Result<(ParseFn, ReadBytesFn), AssetError> {
+fn parse_and_read_functions(path: &Path) -> Result<(ParseFn, ReadFileFn), AssetError> {
     let extension =
         path.extension().map(|extension| extension.to_string_lossy().to_lowercase()).unwrap_or_default();
     match extension.as_str() {
-        "obj" => Ok((obj::parse, read::read_text)),
+        "obj" => Ok((obj::parse, read::read_text_bytes)),
         "off" => Ok((off::parse, read::read_unless_zeros_in_magic)),
         "ply" => Ok((ply::parse, read::read_unless_zeros_in_magic)),
         "stl" => Ok((stl::parse, read::read_unless_zeros_at_start)),
@@ -113,7 +113,7 @@ pub(crate) fn vertex_out_of_range_message(vertex: i64, count: u64) -> String {
 }
 
 type ParseFn = fn(&MeshFileBytes<'_>) -> Result<LoadedMesh, AssetError>;
-type ReadBytesFn = fn(&Path, u64, Monitor<'_>) -> Result<Vec<u8>, AssetError>;
+type ReadFileFn = fn(&Path, u64, Monitor<'_>) -> Result<Vec<u8>, AssetError>;
 
 /// A mesh file in memory, with the monitor for its parser.
 #[derive(Clone, Copy)]
@@ -149,7 +149,7 @@ impl MeshFileBytes<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::assets::rejection;
+    use crate::assets::expect_rejection;
     use crate::control::ignore_progress;
     use proptest::prelude::*;
     use std::fs;
@@ -169,7 +169,7 @@ mod tests {
     fn extensions_ignore_case() {
         let off = b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
         assert_eq!(try_bytes("A.OFF", off).expect("read").mesh.triangles, [[0, 1, 2]]);
-        assert_eq!(rejection(try_bytes("a.xyz", off)), (None, UNKNOWN_FORMAT.to_owned()));
+        assert_eq!(expect_rejection(try_bytes("a.xyz", off)), (None, UNKNOWN_FORMAT.to_owned()));
     }
 
     #[test]

@@ -51,7 +51,7 @@ impl Faces {
     }
 
     /// Replaces each corner's vertex with the first vertex at the same position.
-    pub(super) fn merge_coincident_vertices(
+    pub(super) fn merge_vertices_by_position(
         &mut self,
         positions: &[Vec3],
         token: &CancelToken,
@@ -150,7 +150,7 @@ impl ColorComponentExtremes {
 
     /// Returns the byte offset of a color with a fraction, and a warning that the header declares integers.
     pub(super) fn fraction_in_integers_warning(&self) -> Option<(usize, String)> {
-        self.fraction.map(|(value, at)| (at, dropped_fractions_warning(value)))
+        self.fraction.map(|(value, at)| (at, dropped_color_fractions_warning(value)))
     }
 }
 
@@ -160,7 +160,7 @@ pub(super) fn clamped_color_warning(value: f64, one: f64) -> String {
 }
 
 /// Warning about fractions in colors declared as integers.
-pub(super) fn dropped_fractions_warning(value: f64) -> String {
+pub(super) fn dropped_color_fractions_warning(value: f64) -> String {
     format!("the header declares integer colors, but a component is {value}; fractions are dropped")
 }
 

@@ -35,7 +35,7 @@ const HAS_COORDINATES_5: u32 = 0x4;
 const HAS_TANGENTS_5: u32 = 0x2;
 
 /// Whether a path has the extension `.serialized`.
-pub fn is_serialized(path: &Path) -> bool {
+pub fn has_serialized_extension(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("serialized"))
 }
 
@@ -141,18 +141,18 @@ impl MeshStream<'_> {
         Ok(bytes)
     }
 
-    fn array<const N: usize>(&mut self) -> Result<[u8; N], AssetError> {
+    fn byte_array<const N: usize>(&mut self) -> Result<[u8; N], AssetError> {
         let mut array = [0; N];
         array.copy_from_slice(&self.bytes(N)?);
         Ok(array)
     }
 
     fn u32(&mut self) -> Result<u32, AssetError> {
-        Ok(u32::from_le_bytes(self.array()?))
+        Ok(u32::from_le_bytes(self.byte_array()?))
     }
 
     fn u64(&mut self) -> Result<u64, AssetError> {
-        Ok(u64::from_le_bytes(self.array()?))
+        Ok(u64::from_le_bytes(self.byte_array()?))
     }
 
     /// Reads a count, such as the number of vertices. `what` names the counted elements in errors.
@@ -168,7 +168,7 @@ impl MeshStream<'_> {
     /// Skips a null-terminated name.
     fn skip_terminated_name(&mut self) -> Result<(), AssetError> {
         for _ in 0..MAX_NAME_BYTES {
-            if self.array::<1>()? == [0] {
+            if self.byte_array::<1>()? == [0] {
                 return Ok(());
             }
         }
@@ -242,7 +242,7 @@ fn add_vertices(
         stream.floats(3 * vertices, is_double)?;
         parsed.warnings.push("vertex colors are ignored".to_owned());
     }
-    add_records(parsed, vertices, &positions, &normals, &uvs);
+    append_vertices(parsed, vertices, &positions, &normals, &uvs);
     stream.indices(3 * triangles)
 }
 
@@ -267,14 +267,14 @@ fn add_vertices_of_version_5(
     let has_normals = flags & HAS_NORMALS != 0 && flags & HAS_TANGENTS_5 == 0;
     let normals = if has_normals { part(3, 3) } else { Vec::new() };
     let uvs = if flags & HAS_COORDINATES_5 != 0 { part(6, 2) } else { Vec::new() };
-    add_records(parsed, vertices, &part(0, 3), &normals, &uvs);
+    append_vertices(parsed, vertices, &part(0, 3), &normals, &uvs);
     let faces = stream.indices(4 * triangles)?;
     Ok(faces.chunks_exact(4).flat_map(|face| face[..3].iter().copied()).collect())
 }
 
 /// Appends `count` vertices. If only some of the merged meshes have normals or texture coordinates, the others
 /// get zeros.
-fn add_records(parsed: &mut ParsedMesh, count: usize, positions: &[f64], normals: &[f64], uvs: &[f64]) {
+fn append_vertices(parsed: &mut ParsedMesh, count: usize, positions: &[f64], normals: &[f64], uvs: &[f64]) {
     let before = parsed.positions.len();
     parsed.positions.extend(positions.chunks_exact(3).map(DVec3::from_slice));
     if !normals.is_empty() || !parsed.normals.is_empty() {
@@ -297,7 +297,7 @@ mod tests {
     use flate2::write::ZlibEncoder;
 
     use super::*;
-    use crate::assets::rejection;
+    use crate::assets::expect_rejection;
     use crate::control::ignore_progress;
 
     /// Encodes a mesh of one triangle, whose first vertex is (x, 0, 0), in the given version of the format.
@@ -362,7 +362,7 @@ mod tests {
                 assert_eq!((min.x, mesh.triangles.len()), (x, count), "version {version}");
                 assert_eq!(mesh.uvs[0], Vec2::new(0.0, 0.25), "version {version}");
             }
-            let (_, reason) = rejection(load_bytes(&bytes, Some(2)));
+            let (_, reason) = expect_rejection(load_bytes(&bytes, Some(2)));
             assert!(reason.contains("out of range"), "{reason}");
         }
     }

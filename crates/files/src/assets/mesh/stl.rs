@@ -259,9 +259,9 @@ impl TextReader<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::assets::expect_rejection;
     use crate::assets::mesh::Monitor;
     use crate::assets::mesh::assemble::NO_FACES;
-    use crate::assets::rejection;
     use crate::control::{CancelToken, ignore_progress};
     use crate::math::Vec3;
     use std::path::Path;
@@ -276,7 +276,7 @@ mod tests {
     }
 
     fn error(bytes: &[u8]) -> (Option<usize>, String) {
-        rejection(read(bytes))
+        expect_rejection(read(bytes))
     }
 
     /// Corners of the outward-facing facets of a tetrahedron.

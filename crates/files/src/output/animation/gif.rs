@@ -25,7 +25,7 @@ pub(super) fn encode(
     let canceled = |canceled| EncodingError::from(std::io::Error::other(canceled));
     let (width, height) = frames.first().map_or((0, 0), |first| (first.width as u16, first.height as u16));
     // Choose the palette from pixels in all frames.
-    let palette = palette(frames);
+    let palette = choose_global_palette(frames);
     token.check_pause_and_cancel().map_err(canceled)?;
     // Write the header: the palette, an infinite loop, and the metadata as comments.
     let mut encoder = Encoder::new(Vec::new(), width, height, &palette)?;
@@ -60,7 +60,7 @@ pub(super) fn encode(
 }
 
 /// Chooses a palette for all frames, with three bytes per color.
-fn palette(frames: &[Srgb8Image]) -> Vec<u8> {
+fn choose_global_palette(frames: &[Srgb8Image]) -> Vec<u8> {
     let pixels: usize = frames.iter().map(|frame| frame.pixels.len()).sum();
     // An odd step avoids sampling the same columns in every row.
     let step = (pixels / PALETTE_SAMPLES) | 1;

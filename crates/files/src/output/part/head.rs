@@ -15,7 +15,7 @@ use crate::film::{ConvergenceModel, Film, FilmCreationError, FilmQuantity, Rect,
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PartHeader {
     /// Type of the file.
-    pub kind: PartOrCheckpoint,
+    pub kind: PartFileKind,
     /// Everything the image depends on, with user-visible names.
     pub identity: Vec<NamedRenderInput>,
     /// Share of the image that the file contains.
@@ -34,14 +34,14 @@ pub struct PartHeader {
 /// Type of a part file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum PartOrCheckpoint {
+pub enum PartFileKind {
     /// A finished part of an image.
     Part,
     /// The saved state of a render that can be resumed.
     Checkpoint,
 }
 
-impl PartOrCheckpoint {
+impl PartFileKind {
     /// Returns the name of the type.
     pub fn name(self) -> &'static str {
         match self {
@@ -86,7 +86,7 @@ impl PartHeader {
 
     /// Searches the input files, then the scene's other references, for a name that matches the end of
     /// `path`. The file need not exist. Returns the name, relative to the scene's folder.
-    pub(super) fn find_render_input_that_ends_path(&self, path: &Path) -> Option<&str> {
+    pub(super) fn find_input_that_is_path_suffix(&self, path: &Path) -> Option<&str> {
         let inputs = self.identity.iter().filter(|input| input.name.starts_with(FILE));
         let references = self.references.iter().map(String::as_str);
         inputs

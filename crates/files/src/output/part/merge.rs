@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::head::{PartHeader, PartOrCheckpoint, render_input_differences};
+use super::head::{PartFileKind, PartHeader, render_input_differences};
 use super::{PartError, PartFile};
 use crate::control::CancelToken;
 use crate::film::{Film, StoredTile};
@@ -27,7 +27,7 @@ pub fn check_and_list_missing(parts: &[PartFile]) -> Result<Vec<u32>, PartError>
     let Some(first) = parts.first() else { return Ok(Vec::new()) };
     let mut found = BTreeMap::new();
     for part in parts {
-        part.check_kind(PartOrCheckpoint::Part)?;
+        part.check_kind(PartFileKind::Part)?;
         let name = first.path.display().to_string();
         let differences = head_differences(&part.head, &first.head);
         if !differences.is_empty() {
@@ -79,7 +79,7 @@ fn metadata_differences(a: &[(String, String)], b: &[(String, String)]) -> Vec<S
 /// # Errors
 /// Same as [`check_and_list_missing`]. Also fails if parts are missing, a part is inconsistent, or the work
 /// is canceled.
-pub fn merge_into_film(
+pub fn merge_parts(
     parts: &[PartFile],
     is_partial: bool,
     token: &CancelToken,

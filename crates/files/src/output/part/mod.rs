@@ -21,12 +21,11 @@ mod save;
 
 pub use error::{PartError, missing_parts_message};
 pub use head::{
-    ImageHeader, NamedRenderInput, PartHeader, PartOrCheckpoint, PartShare, ToneHeader,
-    render_input_differences,
+    ImageHeader, NamedRenderInput, PartFileKind, PartHeader, PartShare, ToneHeader, render_input_differences,
 };
-pub use merge::{MergedParts, check_and_list_missing, merge_into_film};
+pub use merge::{MergedParts, check_and_list_missing, merge_parts};
 pub use read::{
-    PartFile, find_input_with_same_content, find_render_input_that_ends_path, is_part_or_checkpoint,
+    PartFile, find_input_that_is_path_suffix, find_render_input_by_content, is_part_or_checkpoint,
 };
 pub use save::save;
 

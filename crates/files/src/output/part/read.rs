@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use nix::sys::resource::{Resource, getrlimit, setrlimit};
 
-use super::head::{PartHeader, PartOrCheckpoint};
+use super::head::{PartFileKind, PartHeader};
 use super::{Digest, FOOTER, Footer, MAGIC, PartError, VERSION, digest};
 use crate::control::CancelToken;
 use crate::film::{Film, StoredTile};
@@ -42,7 +42,7 @@ pub fn is_part_or_checkpoint(path: &Path) -> bool {
 /// Returns the name of the input file that has the same content as the file at `path`, or `None` if there is
 /// no such input or the file cannot be read. Input files must not be overwritten, even if the parts were
 /// rendered on another machine.
-pub fn find_input_with_same_content<'a>(parts: &'a [PartFile], path: &Path) -> Option<&'a str> {
+pub fn find_render_input_by_content<'a>(parts: &'a [PartFile], path: &Path) -> Option<&'a str> {
     let mut hasher = blake3::Hasher::new();
     hasher.update_reader(open_raising_file_limit(path).ok()?).ok()?;
     let hash = hasher.finalize().to_hex();
@@ -51,11 +51,11 @@ pub fn find_input_with_same_content<'a>(parts: &'a [PartFile], path: &Path) -> O
 
 /// Returns the name of an input file that matches the end of `path`. Unlike a comparison of contents, this
 /// also finds files that were missing or have since changed.
-pub fn find_render_input_that_ends_path<'a>(parts: &'a [PartFile], path: &Path) -> Option<&'a str> {
+pub fn find_input_that_is_path_suffix<'a>(parts: &'a [PartFile], path: &Path) -> Option<&'a str> {
     let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
     let real = path.canonicalize().unwrap_or_else(|_| absolute.clone());
     parts.iter().find_map(|part| {
-        [&absolute, &real].into_iter().find_map(|path| part.head.find_render_input_that_ends_path(path))
+        [&absolute, &real].into_iter().find_map(|path| part.head.find_input_that_is_path_suffix(path))
     })
 }
 
@@ -114,7 +114,7 @@ impl PartFile {
     ///
     /// # Errors
     /// [`PartError::Kind`].
-    pub fn check_kind(&self, wanted: PartOrCheckpoint) -> Result<(), PartError> {
+    pub fn check_kind(&self, wanted: PartFileKind) -> Result<(), PartError> {
         let found = self.head.kind;
         if found == wanted {
             return Ok(());

@@ -44,7 +44,7 @@ fn encoding_settings() -> FilmEncodingSettings {
 
 fn head(index: u32, count: u32, film: &Film) -> PartHeader {
     PartHeader {
-        kind: PartOrCheckpoint::Part,
+        kind: PartFileKind::Part,
         identity: vec![
             NamedRenderInput::from_setting("seed", "7"),
             NamedRenderInput::from_file("knot.obj", "12ab"),
@@ -86,7 +86,7 @@ fn parts(folder: &Path, count: u32) -> Vec<PathBuf> {
 
 fn merged(paths: &[PathBuf]) -> Result<MergedParts, PartError> {
     let parts = paths.iter().map(|path| opened(path)).collect::<Result<Vec<_>, _>>()?;
-    merge_into_film(&parts, false, &CancelToken::new(), |_, _| ())
+    merge_parts(&parts, false, &CancelToken::new(), |_, _| ())
 }
 
 #[test]
@@ -98,7 +98,7 @@ fn parts_merge_in_any_order() {
         paths.reverse();
         let film = merged(&paths).expect("they fit").film;
         assert_eq!(film.radiance_image().pixels, whole.radiance_image().pixels, "{count} parts");
-        assert_eq!(film.mean_luminance_error(), whole.mean_luminance_error());
+        assert_eq!(film.mean_luminance_standard_error(), whole.mean_luminance_standard_error());
         let part = opened(&paths[0]).expect("a part");
         assert_eq!(part.head.picture.film_encoding_settings(), Some(encoding_settings()));
         assert_eq!(part.state, json!({ "a": 1 }));
@@ -140,7 +140,7 @@ fn mismatched_parts_are_rejected() {
         assert!(path.ends_with("other.part") && differences.len() == 1, "{differences:?}");
         assert!(words.iter().all(|word| differences[0].contains(word)), "{differences:?}");
     }
-    let checkpoint = other(&|head: &mut PartHeader| head.kind = PartOrCheckpoint::Checkpoint);
+    let checkpoint = other(&|head: &mut PartHeader| head.kind = PartFileKind::Checkpoint);
     assert!(
         matches!(checkpoint, PartError::Kind { found: "checkpoint", wanted: "part", .. }),
         "{checkpoint}"
@@ -296,6 +296,6 @@ fn inputs_match_the_end_of_a_path() {
         ("/d.png", None),
         ("/scenes", None),
     ] {
-        assert_eq!(head.find_render_input_that_ends_path(Path::new(path)), expected, "{path}");
+        assert_eq!(head.find_input_that_is_path_suffix(Path::new(path)), expected, "{path}");
     }
 }

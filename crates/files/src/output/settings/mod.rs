@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 use ::exr::meta::MetaData;
 
-use super::part::{PartFile, PartOrCheckpoint};
+use super::part::{PartFile, PartFileKind};
 use super::{PROGRAM, SOFTWARE};
 use crate::system::describe_error;
 use crate::system::file::{self, PART_MAGIC};
@@ -199,8 +199,8 @@ fn read_exr_info(bytes: &[u8]) -> Option<ImageFileInfo> {
 fn read_part_file_info(path: &Path) -> Result<ImageFileInfo, String> {
     let head = PartFile::read_header(path).map_err(|error| error.to_string())?;
     let format = match head.kind {
-        PartOrCheckpoint::Part => format!("part {} of {}", head.share.index, head.share.count),
-        PartOrCheckpoint::Checkpoint => "checkpoint".to_owned(),
+        PartFileKind::Part => format!("part {} of {}", head.share.index, head.share.count),
+        PartFileKind::Checkpoint => "checkpoint".to_owned(),
     };
     let mut info = ImageFileInfo {
         format,

@@ -162,7 +162,7 @@ fn partition_unless_leaf_is_cheaper(
         None if count > LEAF_SIZE && is_above_median && centroids.extent() == Vec3::ZERO => {
             Some((partition_by_size(references), true))
         }
-        Some(split) if count >= NESTED_SIZE && is_size_split_cheaper(references, bounds, &split) => {
+        Some(split) if count >= NESTED_SIZE && is_box_size_split_cheaper(references, bounds, &split) => {
             Some((partition_by_size(references), true))
         }
         Some(split)
@@ -194,7 +194,7 @@ fn partition_by_size(references: &mut [PrimitiveReference]) -> usize {
 
 /// Whether splitting by size is much cheaper than splitting at the best plane. If boxes are nested, every
 /// plane leaves nearly full-size boxes on both sides.
-fn is_size_split_cheaper(references: &mut [PrimitiveReference], bounds: Aabb, split: &Split) -> bool {
+fn is_box_size_split_cheaper(references: &mut [PrimitiveReference], bounds: Aabb, split: &Split) -> bool {
     let count = references.len() as f32;
     if split.cost < NESTED_COST * bounds.half_area() * count {
         return false;

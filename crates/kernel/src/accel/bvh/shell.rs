@@ -43,7 +43,7 @@ impl SphericalShell {
     }
 
     /// The shell around the bounding box of an arbitrary primitive. It has no inner ball.
-    pub fn from_bounds(bounds: &Aabb) -> Self {
+    pub fn enclosing_box(bounds: &Aabb) -> Self {
         let (min, max) = (bounds.min.as_dvec3(), bounds.max.as_dvec3());
         let center = (min + max) * 0.5;
         Self { center, inner: f64::NEG_INFINITY, outer: (max - center).length() }
@@ -213,7 +213,7 @@ impl Bvh {
     /// separately for each caller would not make it faster.
     #[cold]
     #[inline(never)]
-    pub(super) fn visit_front_to_back_with_shells(
+    pub(super) fn visit_with_spherical_shells(
         &self,
         shells: &[[SphericalShell; 2]],
         ray: &Ray,

@@ -99,7 +99,8 @@ fn nested_box_queries_match_brute_force() {
                 }
             }
             // The last three enclosing primitives must have been visited.
-            let encloses = |id: &u32| spheres[*id as usize].encloses(at.as_dvec3()) && id.is_multiple_of(2);
+            let encloses =
+                |id: &u32| spheres[*id as usize].volume_contains(at.as_dvec3()) && id.is_multiple_of(2);
             let all = (0..spheres.len() as u32).rev().filter(encloses);
             let found: Vec<_> = visited.iter().chain(&enclosing).copied().filter(encloses).collect();
             assert!(all.take(3).all(|id| found.contains(&id)), "{at}: {found:?}");

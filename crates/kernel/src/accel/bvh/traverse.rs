@@ -3,7 +3,7 @@
 use arrayvec::ArrayVec;
 
 use super::{Bvh, ChildRef, DEEP_STACK, SHALLOW_STACK};
-use crate::accel::{RayBoxInterval, TreeNodeInfo};
+use crate::accel::{NodeBoundsAndDepth, RayBoxInterval};
 use crate::geometry::aabb::{SLAB_PAD, SlabRay};
 use crate::geometry::packet::set_bit_lanes;
 use crate::geometry::{Aabb, Ray};
@@ -15,7 +15,7 @@ impl Bvh {
     #[inline]
     pub fn visit_primitives_front_to_back(&self, ray: &Ray, mut test: impl FnMut(u32, f32) -> Option<f32>) {
         if let Some(shells) = &self.shells {
-            self.visit_front_to_back_with_shells(shells, ray, &mut test);
+            self.visit_with_spherical_shells(shells, ray, &mut test);
         } else if self.depth < SHALLOW_STACK {
             self.visit_front_to_back_with_stack_size::<SHALLOW_STACK>(ray, test);
         } else {
@@ -99,14 +99,14 @@ impl Bvh {
     pub fn visit_nodes_along_ray(
         &self,
         ray: &Ray,
-        mut visit: impl FnMut(&TreeNodeInfo, &RayBoxInterval) -> bool,
+        mut visit: impl FnMut(&NodeBoundsAndDepth, &RayBoxInterval) -> bool,
         mut own: impl FnMut(u32, u32),
     ) {
         let root = (self.bounds, ChildRef { first: 0, count: 0 }, 0);
         let mut pending = if self.nodes.is_empty() { Vec::new() } else { vec![root] };
         while let Some((bounds, child, depth)) = pending.pop() {
             let Some(stretch) = RayBoxInterval::new(&bounds, ray) else { continue };
-            if !visit(&TreeNodeInfo { bounds, depth, shapes: child.count }, &stretch) {
+            if !visit(&NodeBoundsAndDepth { bounds, depth, shapes: child.count }, &stretch) {
                 continue;
             }
             if child.count > 0 {

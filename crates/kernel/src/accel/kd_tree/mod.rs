@@ -10,7 +10,7 @@ mod node;
 mod traverse;
 mod validate;
 
-use crate::accel::{RayBoxInterval, TreeNodeInfo};
+use crate::accel::{NodeBoundsAndDepth, RayBoxInterval};
 use crate::control::{CancelToken, Canceled};
 use crate::geometry::{Aabb, Ray};
 use crate::math::Vec3;
@@ -116,7 +116,7 @@ impl KdTree {
     pub fn visit_nodes_along_ray(
         &self,
         ray: &Ray,
-        mut visit: impl FnMut(&TreeNodeInfo, &RayBoxInterval) -> bool,
+        mut visit: impl FnMut(&NodeBoundsAndDepth, &RayBoxInterval) -> bool,
     ) {
         let mut pending = if self.nodes.is_empty() { Vec::new() } else { vec![(self.bounds, 0_u32, 0)] };
         while let Some((bounds, place, depth)) = pending.pop() {
@@ -126,7 +126,7 @@ impl KdTree {
                 DecodedNode::Inner { .. } => 0,
                 DecodedNode::Leaf { count, .. } => count,
             };
-            if !visit(&TreeNodeInfo { bounds, depth, shapes }, &stretch) {
+            if !visit(&NodeBoundsAndDepth { bounds, depth, shapes }, &stretch) {
                 continue;
             }
             if let DecodedNode::Inner { axis, at, right } = kind {

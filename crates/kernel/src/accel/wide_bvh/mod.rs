@@ -14,7 +14,7 @@ use crate::math::Vec3;
 
 pub use simd::{InstructionSet, SimdKernel, pages};
 
-use crate::accel::{F32x16, PACKET_SIZE, RayBoxInterval, TreeNodeInfo};
+use crate::accel::{F32x16, NodeBoundsAndDepth, PACKET_SIZE, RayBoxInterval};
 
 use node::{TrianglePack, WideNode};
 
@@ -69,7 +69,7 @@ impl WideBvh {
     /// Sets the instruction set for traversal. Falls back to the fastest supported one if the processor lacks
     /// `instructions`.
     pub fn with_instruction_set(mut self, instructions: InstructionSet) -> Self {
-        self.instructions = instructions.or_best_supported();
+        self.instructions = instructions.or_best_if_unsupported();
         self
     }
 
@@ -111,7 +111,7 @@ impl WideBvh {
     pub fn visit_nodes_along_ray(
         &self,
         ray: &Ray,
-        mut visit: impl FnMut(&TreeNodeInfo, &RayBoxInterval) -> bool,
+        mut visit: impl FnMut(&NodeBoundsAndDepth, &RayBoxInterval) -> bool,
     ) {
         let root = (self.bounds, node::Child::Inner(0), 0);
         let mut pending = if self.nodes.is_empty() { Vec::new() } else { vec![root] };
@@ -124,7 +124,7 @@ impl WideBvh {
                     packs.iter().map(|pack| pack.ids().count() as u32).sum()
                 }
             };
-            if !visit(&TreeNodeInfo { bounds, depth, shapes }, &stretch) {
+            if !visit(&NodeBoundsAndDepth { bounds, depth, shapes }, &stretch) {
                 continue;
             }
             if let node::Child::Inner(place) = child {

@@ -8,7 +8,7 @@ use super::surface::SurfacePoint;
 use super::surface_of_revolution::{
     self, AxialFrame, LocalLine, direction_at_u, radial_direction_toward, u_from_direction, unrounded_t,
 };
-use super::surface_packet::{SurfaceF64, SurfacePointF64};
+use super::surface_packet::{SurfacePointF64, SurfacePointsInF64};
 use super::{Aabb, RayF64, ShapeHit, SurfaceSample};
 use crate::math::{DVec2, DVec3, Vec2};
 use crossing::UnitTorusLine;
@@ -28,7 +28,7 @@ pub struct Torus {
     tube: f64,
 }
 
-impl SurfaceF64 for Torus {
+impl SurfacePointsInF64 for Torus {
     fn surface_point_f64(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
         let (out, from_circle) =
             self.directions_from_axis_and_circle(ray.at(unrounded_t(hit, self.intersect_f64(ray))));
@@ -203,7 +203,7 @@ impl Torus {
     }
 
     /// Whether a point is inside.
-    pub fn encloses(&self, point: DVec3) -> bool {
+    pub fn volume_contains(&self, point: DVec3) -> bool {
         self.signed_distance(point) < 0.0
     }
 

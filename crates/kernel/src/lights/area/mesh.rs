@@ -8,7 +8,7 @@ use super::{LightHitPoint, ShapeEmitter};
 use crate::control::{CancelToken, Canceled};
 use crate::geometry::SurfaceSample;
 use crate::geometry::triangle::Triangle;
-use crate::lights::sample::{LightSample, LightSceneGeometry, ShadowRayEnd};
+use crate::lights::sample::{GeometryOfLight, LightSample, ShadowRayEnd};
 use crate::lights::tree::{LightBounds, LightTree, MAX_WITHOUT_TREE, Receiver};
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::sampling::distribution::DiscreteDistribution;
@@ -150,7 +150,7 @@ impl MeshEmitter {
         let (arrival, primitive) = match &self.sampling {
             MeshSampling::Quad(quad) => {
                 let arrival = quad.quad.sample(point, u);
-                (arrival, quad.primitive_at(point, arrival.target))
+                (arrival, quad.primitive_containing(point, arrival.target))
             }
             MeshSampling::Area(facets) => {
                 let arrival = facets.sample(point, u);
@@ -169,7 +169,7 @@ impl MeshEmitter {
             end: ShadowRayEnd::At(arrival.target),
             direction: arrival.direction,
             weight: radiance * arrival.factor,
-            source: LightSceneGeometry::Primitive(object, primitive),
+            source: GeometryOfLight::Primitive(object, primitive),
         })
     }
 
@@ -233,7 +233,7 @@ impl TrianglePairQuad {
 
     /// Primitive index of the triangle that contains the sampled `target`.
     #[inline(always)]
-    pub fn primitive_at(&self, point: Vec3, target: Vec3) -> u32 {
+    pub fn primitive_containing(&self, point: Vec3, target: Vec3) -> u32 {
         let offset = (target - point) - self.quad.offset_to_corner(point);
         if offset.dot(self.across) < 1.0 { self.primitives[0] } else { self.primitives[1] }
     }

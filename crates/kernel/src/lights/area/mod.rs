@@ -28,7 +28,7 @@ pub use emission_modulation::{
 pub use mesh::MeshEmitter;
 pub use sample_point::SampledLightPoint;
 
-use super::sample::{LightHitPoint, LightSample, LightSceneGeometry, ShadowRayEnd};
+use super::sample::{GeometryOfLight, LightHitPoint, LightSample, ShadowRayEnd};
 use super::tree::bounds::{EmissionCone, LightBounds, mean_channel};
 use crate::geometry::Shape;
 use crate::geometry::disk::Disk;
@@ -223,7 +223,7 @@ fn front_emitter(shape: &Shape) -> Option<Emitter> {
 
 /// Creates the light on one side of a see-through shape, or returns `None` if the shape is infinite or has no
 /// area.
-pub fn see_through_shape_side_light(
+pub fn create_see_through_side_light(
     shape: &Shape,
     side: Side,
     radiance: Vec3,
@@ -277,12 +277,12 @@ fn turned_over_if_flat(shape: &Shape) -> Option<Shape> {
 }
 
 /// Normal of a flat shape's front, of any length, or `None` for other shapes.
-fn flat_normal(shape: &Shape) -> Option<DVec3> {
+fn normal_if_flat(shape: &Shape) -> Option<DVec3> {
     match shape {
         Shape::Quad(quad) => Some(quad.u.cross(quad.v)),
         Shape::Triangle(Triangle { a, b, c }) => Some((b - a).cross(c - a)),
         Shape::Disk(disk) => Some(disk.normal()),
-        Shape::Transformed(own) => Some(own.to_world.normal(flat_normal(&own.shape)?)),
+        Shape::Transformed(own) => Some(own.to_world.normal(normal_if_flat(&own.shape)?)),
         Shape::Sphere(_)
         | Shape::Plane(_)
         | Shape::Box(_)
@@ -310,7 +310,7 @@ fn area(shape: &Shape) -> f64 {
 /// the mean over all directions for convex shapes (Cauchy).
 fn emission_bounds(shape: &Shape, radiance: Vec3) -> Option<LightBounds> {
     let area = area(shape);
-    let (shown, cone) = match flat_normal(shape).map(DVec3::normalize) {
+    let (shown, cone) = match normal_if_flat(shape).map(DVec3::normalize) {
         Some(normal) => (area, EmissionCone::lambertian(normal)),
         None => (0.25 * area, EmissionCone::ALL),
     };
@@ -344,10 +344,8 @@ impl AreaLight {
             return Some(sample);
         };
         let primitive = match sample.source {
-            LightSceneGeometry::Primitive(_, primitive) => primitive,
-            LightSceneGeometry::Object(_)
-            | LightSceneGeometry::SeeThrough(_)
-            | LightSceneGeometry::Nothing => 0,
+            GeometryOfLight::Primitive(_, primitive) => primitive,
+            GeometryOfLight::Object(_) | GeometryOfLight::SeeThrough(_) | GeometryOfLight::Nothing => 0,
         };
         Some(LightSample {
             weight: sample.weight * modulation.radiance_factor(target, primitive, sample.direction),
@@ -360,7 +358,7 @@ impl AreaLight {
     pub fn sample_unmodulated(&self, point: Vec3, normal: Vec3, u: [f32; 2]) -> Option<LightSample> {
         let own = |sample: SampledLightPoint| {
             let SampledLightPoint { direction, target, factor } = sample;
-            let (end, source) = (ShadowRayEnd::At(target), self.scene_geometry());
+            let (end, source) = (ShadowRayEnd::At(target), self.scene_geometry_id());
             (factor > 0.0).then(|| LightSample { end, direction, weight: self.radiance * factor, source })
         };
         of_any!(&self.shape,
@@ -369,13 +367,9 @@ impl AreaLight {
     }
 
     /// The light's geometry.
-    pub(super) fn scene_geometry(&self) -> LightSceneGeometry {
+    pub(super) fn scene_geometry_id(&self) -> GeometryOfLight {
         let is_sheer = matches!(self.shape, Emitter::SeeThrough(_));
-        if is_sheer {
-            LightSceneGeometry::SeeThrough(self.object)
-        } else {
-            LightSceneGeometry::Object(self.object)
-        }
+        if is_sheer { GeometryOfLight::SeeThrough(self.object) } else { GeometryOfLight::Object(self.object) }
     }
 
     /// Implements [`Light::pdf`](super::Light::pdf).

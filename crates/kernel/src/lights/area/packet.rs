@@ -3,18 +3,18 @@
 use super::sample_point::SampledLightPoint;
 use super::{AreaLight, Emitter, MeshEmitter, ShapeEmitter};
 use crate::lights::packet::{LightSamplePacket, packet_of};
-use crate::lights::sample::LightSceneGeometry;
+use crate::lights::sample::GeometryOfLight;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, set_lane};
 
 /// Samples triangles by area for a packet in which each lane has its own light.
 macro_rules! triangle_packet_of {
     ($i:ident => ($facets:expr, $light:expr), $points:expr, $u:expr) => {{
-        let mut row = packet_of!(LightSceneGeometry::Nothing, $i => {
+        let mut row = packet_of!(GeometryOfLight::Nothing, $i => {
             let sample: SampledLightPoint = $facets.sample(lane($points, $i), [$u[0][$i], $u[1][$i]]);
             (sample.direction, sample.target, $light.radiance * sample.factor)
         });
         for $i in 0..PACKET_SIZE {
-            let source = LightSceneGeometry::Primitive($light.object, $facets.sampled_primitive($u[0][$i]));
+            let source = GeometryOfLight::Primitive($light.object, $facets.sampled_primitive($u[0][$i]));
             row.sources.set_geometry($i, source);
         }
         row
@@ -33,7 +33,7 @@ impl AreaLight {
         used: u32,
         u: &[F32x16; 2],
     ) -> LightSamplePacket {
-        let source = self.scene_geometry();
+        let source = self.scene_geometry_id();
         macro_rules! packet_from {
             ($emitter:expr) => {
                 packet_of!(source, i => {
@@ -56,7 +56,7 @@ impl AreaLight {
             });
             if let Some(two) = of_two {
                 for i in 0..PACKET_SIZE {
-                    row.sources.part[i] = two.primitive_at(lane(points, i), lane(&row.targets, i));
+                    row.sources.part[i] = two.primitive_containing(lane(points, i), lane(&row.targets, i));
                 }
             }
             return row;

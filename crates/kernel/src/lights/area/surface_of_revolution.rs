@@ -34,7 +34,7 @@ pub trait RevolutionSideView {
     fn max_visible_angle(&self) -> SinCos;
 
     /// Difference between the cosines at the two ends of the visible interval, for an angle around the pole.
-    fn visible_cosine_extent_at_azimuth(&self, around: SinCos) -> f64;
+    fn visible_polar_cosine_extent(&self, around: SinCos) -> f64;
 
     /// Angle from the pole and distance of the point on the side whose angle around the pole is `around`, and
     /// whose polar cosine is at `fraction` of the visible interval.
@@ -62,7 +62,7 @@ impl<S: RevolutionSide> ShapeEmitter for CappedRevolutionEmitter<S> {
                 let (from_pole, distance) =
                     side.polar_angle_and_distance_at_fraction(around, f64::from(u[0] / side_probability));
                 let factor =
-                    side.visible_cosine_extent_at_azimuth(around) / (density * f64::from(side_probability));
+                    side.visible_polar_cosine_extent(around) / (density * f64::from(side_probability));
                 (side.polar_frame().direction(from_pole, around), distance, factor)
             }
             (_, Some((cap, normal))) => {
@@ -85,7 +85,7 @@ impl<S: RevolutionSide> ShapeEmitter for CappedRevolutionEmitter<S> {
             (Some((side, meridians)), _) => {
                 let angle = side.polar_frame().azimuth(hit.direction);
                 side_probability * meridians.pdf(angle)
-                    / side.visible_cosine_extent_at_azimuth(SinCos::from_radians(angle.abs()))
+                    / side.visible_polar_cosine_extent(SinCos::from_radians(angle.abs()))
             }
             (None, _) => 0.0,
         };
@@ -101,7 +101,7 @@ impl<S: RevolutionSide> CappedRevolutionEmitter<S> {
     fn view_from(&self, point: Vec3) -> RevolutionView<S::View> {
         let side = self.side.view_from(point).map(|view| {
             let meridians = AzimuthDistribution::new(view.max_visible_angle(), |turn| {
-                view.visible_cosine_extent_at_azimuth(turn)
+                view.visible_polar_cosine_extent(turn)
             });
             (view, meridians)
         });
@@ -197,7 +197,7 @@ impl RevolutionSideView for CylinderView {
         self.reach
     }
 
-    fn visible_cosine_extent_at_azimuth(&self, around: SinCos) -> f64 {
+    fn visible_polar_cosine_extent(&self, around: SinCos) -> f64 {
         let [low, high] =
             self.end_cosines(self.distance_to_cross_section(SinCos { sin: around.sin.abs(), ..around }));
         high - low
@@ -305,7 +305,7 @@ impl RevolutionSideView for ConeView {
         self.reach
     }
 
-    fn visible_cosine_extent_at_azimuth(&self, around: SinCos) -> f64 {
+    fn visible_polar_cosine_extent(&self, around: SinCos) -> f64 {
         let at_tip = self.generatrix_angle_at_tip(around);
         let (along, across) = (self.distance - self.slant * at_tip.cos, self.slant * at_tip.sin);
         let length = (along * along + across * across).sqrt();
@@ -314,7 +314,7 @@ impl RevolutionSideView for ConeView {
 
     fn polar_angle_and_distance_at_fraction(&self, around: SinCos, fraction: f64) -> (SinCos, f64) {
         let at_tip = self.generatrix_angle_at_tip(around);
-        let versine = fraction * self.visible_cosine_extent_at_azimuth(around);
+        let versine = fraction * self.visible_polar_cosine_extent(around);
         let from_pole = SinCos { sin: (versine * (2.0 - versine)).max(0.0).sqrt(), cos: 1.0 - versine };
         let sin = at_tip.sin * from_pole.cos + at_tip.cos * from_pole.sin;
         let farthest = self.distance + self.slant;

@@ -53,7 +53,7 @@ struct TorusView {
 }
 
 /// The visible part of a slice. Lengths are measured from the foot in the slice's plane.
-struct TorusSlice {
+struct TorusCrossSection {
     /// Sine and cosine of φ.
     turn: SinCos,
     /// Distance from the axis to the foot.
@@ -96,7 +96,7 @@ impl ShapeEmitter for TorusEmitter {
             return SampledLightPoint::NOTHING;
         };
         let (sine, in_slice) = slice.elevation_distribution(&view).sample(f64::from(u[1]));
-        let place = slice.near_intersection(&view, slice.slice_tangent_from_elevation_sine(2.0 * sine - 1.0));
+        let place = slice.near_intersection(&view, slice.slice_tan_from_elevation_sin(2.0 * sine - 1.0));
         let own = view.to_density_over_angle(density, tau) * 0.5 * in_slice / place.factor;
         if !(own > 0.0) {
             return SampledLightPoint::NOTHING;
@@ -188,7 +188,7 @@ impl TorusView {
             let (sin, cos) = sin_cos((sinh / self.closeness) as f32);
             let slice = self.slice(SinCos { sin: f64::from(sin), cos: f64::from(cos) });
             slice.map_or(0.0, |slice| {
-                slice.near_intersection(self, slice.slice_tangent_from_elevation_sine(0.0)).factor
+                slice.near_intersection(self, slice.slice_tan_from_elevation_sin(0.0)).factor
             }) * cosh
         }))
     }
@@ -199,7 +199,7 @@ impl TorusView {
     }
 
     /// The slice at an angle φ, or `None` if the slice is not visible.
-    fn slice(&self, turn: SinCos) -> Option<TorusSlice> {
+    fn slice(&self, turn: SinCos) -> Option<TorusCrossSection> {
         let foot = self.distance * turn.cos;
         let off = self.distance * turn.sin;
         let beside = self.radius - foot;
@@ -207,7 +207,7 @@ impl TorusView {
         let (gap, power) = (distance - self.tube, (distance - self.tube) * (distance + self.tube));
         let highest = gap * self.tube / power.max(0.0).sqrt();
         let slope = gap * gap + off * off + highest * highest;
-        (gap > 0.0).then(|| TorusSlice {
+        (gap > 0.0).then(|| TorusCrossSection {
             turn,
             foot,
             off,
@@ -219,7 +219,7 @@ impl TorusView {
     }
 
     /// Offset from the view point to a point on a slice.
-    fn offset_to_slice_point(&self, slice: &TorusSlice, place: &SlicePoint) -> DVec3 {
+    fn offset_to_slice_point(&self, slice: &TorusCrossSection, place: &SlicePoint) -> DVec3 {
         let SinCos { sin, cos } = slice.turn;
         let outwards = self.out * cos + self.across * sin;
         let along = self.across * cos - self.out * sin;
@@ -262,10 +262,10 @@ impl TorusView {
     }
 }
 
-impl TorusSlice {
+impl TorusCrossSection {
     /// Converts the relative sine of the elevation (the sine divided by its maximum) to the tangent of the
     /// angle to the circle's center.
-    fn slice_tangent_from_elevation_sine(&self, sine: f64) -> f64 {
+    fn slice_tan_from_elevation_sin(&self, sine: f64) -> f64 {
         let sine = sine * self.sine;
         let distance = (self.gap * self.gap + self.off * self.off).sqrt();
         distance * sine / ((1.0 - sine) * (1.0 + sine)).sqrt() / self.gap
@@ -281,7 +281,7 @@ impl TorusSlice {
     fn elevation_distribution(&self, view: &TorusView) -> PiecewiseLinear<SLICE_POINTS> {
         let sine = |i: usize| 2.0 * i as f64 / (SLICE_POINTS - 1) as f64 - 1.0;
         PiecewiseLinear(std::array::from_fn(|i| {
-            self.near_intersection(view, self.slice_tangent_from_elevation_sine(sine(i))).factor
+            self.near_intersection(view, self.slice_tan_from_elevation_sin(sine(i))).factor
         }))
     }
 

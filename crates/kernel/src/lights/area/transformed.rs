@@ -1,7 +1,7 @@
 //! Light sampling of shapes under an affine transform.
 
 use super::sample_point::SampledLightPoint;
-use super::{Emitter, LightHitPoint, ShapeEmitter, flat_normal};
+use super::{Emitter, LightHitPoint, ShapeEmitter, normal_if_flat};
 use crate::geometry::transformed::TransformedShape;
 use crate::math::{DVec3, Vec3};
 
@@ -66,7 +66,7 @@ impl TransformedEmitter {
     fn local_point_if_in_front(&self, point: Vec3) -> Option<Vec3> {
         let shape = &self.transformed.shape;
         let point = self.transformed.to_world.inverse_point(point.as_dvec3());
-        let is_behind = match flat_normal(shape) {
+        let is_behind = match normal_if_flat(shape) {
             Some(normal) => !(normal.dot(point - shape.centroid()) > 0.0),
             None => shape.encloses_point(point),
         };

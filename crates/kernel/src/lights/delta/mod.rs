@@ -7,7 +7,7 @@ pub use point::{Falloff, PointLight};
 pub use spot::SpotLight;
 
 use super::packet::{LightSamplePacket, packet_of};
-use super::sample::{LightSample, LightSceneGeometry, ShadowRayEnd};
+use super::sample::{GeometryOfLight, LightSample, ShadowRayEnd};
 use super::tree::LightBounds;
 use crate::math::Vec3;
 use crate::math::lanes::{Vec3x16, lane};
@@ -47,7 +47,7 @@ pub trait DeltaLight {
             end,
             direction,
             weight,
-            source: LightSceneGeometry::Nothing,
+            source: GeometryOfLight::Nothing,
         })
     }
 
@@ -55,7 +55,7 @@ pub trait DeltaLight {
     #[inline(always)]
     fn sample_packet(&self, points: &Vec3x16) -> LightSamplePacket {
         let target = self.isotropic_at_peak_intensity().position.as_vec3();
-        packet_of!(LightSceneGeometry::Nothing, i => {
+        packet_of!(GeometryOfLight::Nothing, i => {
             let (direction, weight) = self.direction_and_irradiance(lane(points, i));
             (direction, target, weight)
         })

@@ -5,7 +5,7 @@ use std::f32::consts::PI;
 use super::InfiniteLight;
 use super::sky::sun::OrientedSunDisk;
 use crate::lights::packet::{LightSamplePacket, infinite_packet_of};
-use crate::lights::sample::{LightSample, LightSceneGeometry, ShadowRayEnd};
+use crate::lights::sample::{GeometryOfLight, LightSample, ShadowRayEnd};
 use crate::lights::tree::bounds::{DistanceFalloff, EmissionCone, LightBounds, mean_channel};
 use crate::math::Vec3;
 use crate::math::frame::Frame;
@@ -55,7 +55,7 @@ impl DirectionalLight {
             end: ShadowRayEnd::Beyond,
             direction,
             weight,
-            source: LightSceneGeometry::Nothing,
+            source: GeometryOfLight::Nothing,
         })
     }
 

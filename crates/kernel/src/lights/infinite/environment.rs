@@ -7,7 +7,7 @@ use super::InfiniteLight;
 use super::environment_map::EnvironmentMap;
 use super::sky::{SkyDome, SkyFrame};
 use crate::lights::packet::LightSamplePacket;
-use crate::lights::sample::{LightSample, LightSceneGeometry, ShadowRayEnd};
+use crate::lights::sample::{GeometryOfLight, LightSample, ShadowRayEnd};
 use crate::lights::tree::bounds::{DistanceFalloff, EmissionCone, LightBounds, mean_channel};
 use crate::math::frame::Frame;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, set_lane};
@@ -63,7 +63,7 @@ impl MapOrientation {
 
     /// The turn for sampling the map. Pass sampled directions to [`Self::to_world`].
     #[inline(always)]
-    fn turn_fraction(self) -> f32 {
+    fn turn_for_map_sampling(self) -> f32 {
         match self {
             Self::Turn(turn) => turn,
             Self::Rotation(_) => 0.0,
@@ -130,7 +130,7 @@ impl Environment {
                 orientation
                     .convert_packet_if_rotated(&mut directions, |own, direction| own.to_map(direction).0);
                 let (mut colors, pdfs) =
-                    sky.lookup_color_and_pdf_packet(&directions, orientation.turn_fraction());
+                    sky.lookup_color_and_pdf_packet(&directions, orientation.turn_for_map_sampling());
                 for i in 0..PACKET_SIZE {
                     let color = lane(&colors, i) * *factor;
                     set_lane(&mut colors, i, color);
@@ -155,7 +155,8 @@ impl Environment {
                 (directions, radiance, pdfs)
             }
             Self::Map { sky, factor, orientation } => {
-                let (mut directions, mut colors, pdfs) = sky.sample_packet(u, orientation.turn_fraction());
+                let (mut directions, mut colors, pdfs) =
+                    sky.sample_packet(u, orientation.turn_for_map_sampling());
                 orientation.convert_packet_if_rotated(&mut directions, MapOrientation::to_world);
                 for i in 0..PACKET_SIZE {
                     let color = lane(&colors, i) * *factor;
@@ -172,7 +173,7 @@ impl Environment {
             let weight = lane(&weights, i) * inverse_pdfs[i];
             set_lane(&mut weights, i, weight);
         }
-        let dark = LightSamplePacket::black(LightSceneGeometry::Nothing);
+        let dark = LightSamplePacket::black(GeometryOfLight::Nothing);
         LightSamplePacket {
             directions,
             weights,
@@ -205,7 +206,7 @@ impl Environment {
                 (Frame::from_normal(normal).to_world(warp::cone(u, 1.0)), *radiance, HEMISPHERE_PDF)
             }
             Self::Map { sky, factor, orientation } => {
-                let (direction, color, pdf) = sky.sample(u, orientation.turn_fraction());
+                let (direction, color, pdf) = sky.sample(u, orientation.turn_for_map_sampling());
                 (orientation.to_world(direction), color * *factor, pdf)
             }
             Self::Sky { dome, frame } => dome.sample(frame, u),
@@ -216,7 +217,7 @@ impl Environment {
             end: ShadowRayEnd::Beyond,
             direction,
             weight,
-            source: LightSceneGeometry::Nothing,
+            source: GeometryOfLight::Nothing,
         })
     }
 }
@@ -226,7 +227,7 @@ impl InfiniteLight for Environment {
         match self {
             Self::Constant(radiance) => (warp::cone(u, 2.0), *radiance * (4.0 * PI)),
             Self::Map { sky, factor, orientation } => {
-                let (direction, color, pdf) = sky.sample(u, orientation.turn_fraction());
+                let (direction, color, pdf) = sky.sample(u, orientation.turn_for_map_sampling());
                 // The pdf is 0 at the centers of black texels.
                 (orientation.to_world(direction), color * *factor * if pdf > 0.0 { 1.0 / pdf } else { 0.0 })
             }

@@ -14,7 +14,7 @@ use crate::sampling::warp;
 
 choice! {
     /// Polar angles of the rows of an environment map.
-    pub enum MapRows {
+    pub enum MapRowPlacement {
         /// Rows are centered between the poles: half a row is above the first one.
         Centers = "centers",
         /// The first and the last row are at the poles, as in Mitsuba.
@@ -22,7 +22,7 @@ choice! {
     }
 }
 
-impl MapRows {
+impl MapRowPlacement {
     /// Number of rows per half turn, and the coordinate of the first row below the pole +y.
     fn scale_and_offset(self, rows: u32) -> (f32, f32) {
         match self {
@@ -41,7 +41,7 @@ impl MapRows {
 pub struct EnvironmentMap {
     texels: Arc<Texels>,
     cells: PiecewiseConstant2D,
-    /// Result of [`MapRows::scale_and_offset`] for this map.
+    /// Result of [`MapRowPlacement::scale_and_offset`] for this map.
     scale_and_offset: (f32, f32),
     /// Cosines of the polar angles at the tops of the rows of cells, followed by −1.
     heights: Vec<f64>,
@@ -65,12 +65,12 @@ struct TexelPosition {
 impl EnvironmentMap {
     /// Creates a map from nonnegative texels. Returns `None` if all texels are black.
     pub fn new(texels: Arc<Texels>) -> Option<Self> {
-        Self::with_rows(texels, MapRows::Centers)
+        Self::with_rows(texels, MapRowPlacement::Centers)
     }
 
     /// Creates a map from nonnegative texels whose rows have the given polar angles. Returns `None` if all
     /// texels are black.
-    pub fn with_rows(texels: Arc<Texels>, map_rows: MapRows) -> Option<Self> {
+    pub fn with_rows(texels: Arc<Texels>, map_rows: MapRowPlacement) -> Option<Self> {
         let (columns, rows) = (texels.width as usize, texels.height as usize);
         let scale_and_offset @ (scale, offset) = map_rows.scale_and_offset(texels.height);
         let height = |row: usize| match row {
@@ -164,7 +164,7 @@ impl EnvironmentMap {
     #[inline(always)]
     fn direction_in_cell(&self, column: f32, row: usize, along: [f32; 2], turn: f32) -> (Vec3, f32) {
         let extent = self.heights[row + 1] - self.heights[row];
-        self.direction_and_vertical_fraction(
+        self.direction_and_row_fraction(
             column,
             row as f32,
             self.heights[row] + extent * f64::from(along[1]),
@@ -176,7 +176,7 @@ impl EnvironmentMap {
     /// Unit direction at the height `y` and at a fraction `along` of a cell's azimuth range. Also returns the
     /// vertical fraction, measured in angle.
     #[inline(always)]
-    fn direction_and_vertical_fraction(
+    fn direction_and_row_fraction(
         &self,
         column: f32,
         row: f32,
@@ -215,7 +215,7 @@ impl EnvironmentMap {
             let luminances = luminances_of_four_corners(&corners);
             let along = warp::bilinear([rest[0][i], rest[1][i]], &luminances);
             let y = tops[i] + extents[i] * f64::from(along[1]);
-            let (direction, down) = self.direction_and_vertical_fraction(
+            let (direction, down) = self.direction_and_row_fraction(
                 columns[i] as i32 as f32,
                 rows[i] as i32 as f32,
                 y,
@@ -236,7 +236,7 @@ impl EnvironmentMap {
         let (mut between, mut angles) = ([0.0; PACKET_SIZE], [0.0; PACKET_SIZE]);
         for i in 0..PACKET_SIZE {
             let (x, y) = self.cell_coordinates(lane(directions, i), turn);
-            (columns[i], rows[i]) = self.cell_at_coordinates(x, y);
+            (columns[i], rows[i]) = self.cell_from_cell_coordinates(x, y);
             between[i] = x - columns[i] as i32 as f32;
             angles[i] = y - rows[i] as i32 as f32;
         }
@@ -258,7 +258,7 @@ impl EnvironmentMap {
     #[inline(always)]
     fn texel_position(&self, direction: Vec3, turn: f32) -> TexelPosition {
         let (x, y) = self.cell_coordinates(direction, turn);
-        let (column, row) = self.cell_at_coordinates(x, y);
+        let (column, row) = self.cell_from_cell_coordinates(x, y);
         let between = [x - column as f32, y - row as f32];
         let along = [between[0], self.row_fraction_above_direction(row, direction.y)];
         TexelPosition { column, row, between, along }
@@ -277,7 +277,7 @@ impl EnvironmentMap {
 
     /// Column and row of a cell from cell coordinates.
     #[inline(always)]
-    fn cell_at_coordinates(&self, x: f32, y: f32) -> (u32, u32) {
+    fn cell_from_cell_coordinates(&self, x: f32, y: f32) -> (u32, u32) {
         // Rounding may have moved a coordinate from just below 0 to the full width.
         ((x as u32).min(self.texels.width - 1), (y as u32).min(self.texels.height))
     }

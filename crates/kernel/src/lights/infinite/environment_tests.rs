@@ -1,7 +1,7 @@
 use std::f64::consts::{PI, TAU};
 
 use super::*;
-use crate::lights::infinite::MapRows;
+use crate::lights::infinite::MapRowPlacement;
 use crate::materials::texels::{TexelData, Texels};
 use crate::math::{DMat3, DVec3};
 use crate::sampling::{Dimension, PixelSampler};
@@ -127,7 +127,7 @@ fn rotated_maps_move_with_their_axes() {
 fn rows_at_the_poles_are_interpolated_exactly() {
     for height in [2, 3, 17] {
         let texels = texels_from_fn(8, height, |_, y| Vec3::splat(y as f32 / (height - 1) as f32));
-        let map = EnvironmentMap::with_rows(texels, MapRows::Poles).expect("light");
+        let map = EnvironmentMap::with_rows(texels, MapRowPlacement::Poles).expect("light");
         for direction in random_directions(500) {
             let (color, _) = map.lookup_color_and_pdf(direction, 0.0);
             let expected = (f64::from(direction.y).clamp(-1.0, 1.0).acos() / PI) as f32;

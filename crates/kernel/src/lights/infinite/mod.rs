@@ -7,7 +7,7 @@ pub mod sky;
 
 pub use directional::DirectionalLight;
 pub use environment::{Environment, MapOrientation};
-pub use environment_map::{EnvironmentMap, MapRows};
+pub use environment_map::{EnvironmentMap, MapRowPlacement};
 
 use super::tree::LightBounds;
 use crate::math::Vec3;

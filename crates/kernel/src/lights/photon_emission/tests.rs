@@ -16,7 +16,7 @@ use crate::lights::area::Side;
 use crate::lights::delta::DeltaLight;
 use crate::lights::delta::SpotLight;
 use crate::lights::infinite::sky::sun::OrientedSunDisk;
-use crate::lights::infinite::sky::{Sky, SkyFrame, SkyParameters};
+use crate::lights::infinite::sky::{Sky, SkyFrame, SkyModelInputs};
 use crate::lights::infinite::{DirectionalLight, Environment, EnvironmentMap};
 use crate::lights::{
     AreaLight, EmissionModulation, Emitter, EmittingPart, MeshEmitter, TriangleWithUvs, UvMapping,
@@ -104,7 +104,7 @@ fn sky_lights() -> Vec<(Light, Option<Shape>, f64)> {
 
 /// A sky, and its sun with a diameter of 10°.
 fn sky_and_sun() -> (Light, Light) {
-    let parameters = SkyParameters {
+    let parameters = SkyModelInputs {
         sun_elevation: 0.8_f64.asin(),
         turbidity: 3.0,
         ground: Vec3::splat(0.3),

@@ -66,7 +66,7 @@ impl LightTreeBuilder<'_> {
         let number = self.nodes.len() as u32;
         self.nodes.push(LightTreeNode::empty(self.leaves));
         let is_over_lights = leaves.len() <= PACKET_SIZE;
-        let groups = partition_into_groups(leaves, self.token)?;
+        let groups = partition_into_children(leaves, self.token)?;
         let mut node = LightTreeNode::empty(self.leaves);
         let (mut rest, mut first) = (leaves, before);
         for (i, count) in groups.into_iter().enumerate() {
@@ -91,7 +91,7 @@ impl LightTreeBuilder<'_> {
 
 /// Partitions the leaves into at most one group per child, and returns the group sizes. Uses as few groups as
 /// possible, so that the nodes are full.
-fn partition_into_groups(leaves: &mut [LightLeaf], token: &CancelToken) -> Result<Vec<usize>, Canceled> {
+fn partition_into_children(leaves: &mut [LightLeaf], token: &CancelToken) -> Result<Vec<usize>, Canceled> {
     token.check_pause_and_cancel()?;
     if leaves.len() <= PACKET_SIZE {
         return Ok(vec![1; leaves.len()]);
@@ -100,10 +100,10 @@ fn partition_into_groups(leaves: &mut [LightLeaf], token: &CancelToken) -> Resul
     while unit * PACKET_SIZE < leaves.len() {
         unit *= PACKET_SIZE;
     }
-    let mut groups: Vec<LeafRange> = Vec::with_capacity(PACKET_SIZE);
+    let mut groups: Vec<LeafGroup> = Vec::with_capacity(PACKET_SIZE);
     let mut start = 0;
     for own in leaves.chunk_by(|a, b| a.bounds.space == b.bounds.space) {
-        groups.push(LeafRange::new(start, own));
+        groups.push(LeafGroup::new(start, own));
         start += own.len();
     }
     while groups.len() < PACKET_SIZE {
@@ -112,25 +112,25 @@ fn partition_into_groups(leaves: &mut [LightLeaf], token: &CancelToken) -> Resul
         else {
             break;
         };
-        let LeafRange { start, count, .. } = groups[most_expensive];
+        let LeafGroup { start, count, .. } = groups[most_expensive];
         let own = &mut leaves[start..start + count];
         token.check_pause_and_cancel()?;
         let middle = partition_leaves_along_longest_axis(own, unit);
         let (left, right) = own.split_at(middle);
-        groups[most_expensive] = LeafRange::new(start, left);
-        groups.insert(most_expensive + 1, LeafRange::new(start + middle, right));
+        groups[most_expensive] = LeafGroup::new(start, left);
+        groups.insert(most_expensive + 1, LeafGroup::new(start + middle, right));
     }
     Ok(groups.into_iter().map(|group| group.count).collect())
 }
 
 /// A range of leaves.
-struct LeafRange {
+struct LeafGroup {
     start: usize,
     count: usize,
     cost: f64,
 }
 
-impl LeafRange {
+impl LeafGroup {
     fn new(start: usize, leaves: &[LightLeaf]) -> Self {
         Self { start, count: leaves.len(), cost: NodeCostSums::from_leaves(leaves).cost() }
     }

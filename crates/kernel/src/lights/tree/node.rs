@@ -259,7 +259,7 @@ impl LightTreeNode {
     #[inline(always)]
     pub fn child_importances(&self, receiver: &Receiver) -> ImportanceAndNearnessPacket {
         let receivers = ReceiverPacket::splat(receiver);
-        expected_contributions(&self.bounds, &receivers, self.is_plain, receiver.lobe.is_some())
+        light_importances(&self.bounds, &receivers, self.is_plain, receiver.lobe.is_some())
     }
 
     /// [`LightTreeNode::child_importances`] of one child for a packet of surface points.
@@ -270,7 +270,7 @@ impl LightTreeNode {
         receivers: &ReceiverPacket,
         has_lobes: bool,
     ) -> F32x16 {
-        expected_contributions(&self.bounds.splat_lane(child), receivers, self.is_plain, has_lobes).importance
+        light_importances(&self.bounds.splat_lane(child), receivers, self.is_plain, has_lobes).importance
     }
 
     /// The child that contains the leaf at `place` in tree order.
@@ -282,7 +282,7 @@ impl LightTreeNode {
 
 /// Importance of a light for a receiver in each lane.
 #[inline(always)]
-fn expected_contributions(
+fn light_importances(
     bounds: &LightBoundsPacket,
     receivers: &ReceiverPacket,
     is_plain: bool,

@@ -81,7 +81,7 @@ impl SingleNodeLightImportances<'_> {
         let mut targets = [0.0; PACKET_SIZE];
         for i in 0..PACKET_SIZE {
             // Stay below the total to avoid rounding past the last child with nonzero importance.
-            let (target, last) = (u[i] * self.totals[i], largest_below(self.totals[i]));
+            let (target, last) = (u[i] * self.totals[i], next_down_or_zero(self.totals[i]));
             targets[i] = if target < last { target } else { last };
         }
         let (mut sums, mut children, mut values) = ([0.0; PACKET_SIZE], [0; PACKET_SIZE], [0.0; PACKET_SIZE]);
@@ -126,6 +126,6 @@ impl SingleNodeLightImportances<'_> {
 
 /// The largest number below a positive `total`, or 0 if `total` is 0.
 #[inline(always)]
-fn largest_below(total: f64) -> f64 {
+fn next_down_or_zero(total: f64) -> f64 {
     f64::from_bits(total.to_bits().saturating_sub(1))
 }

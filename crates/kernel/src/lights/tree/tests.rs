@@ -455,7 +455,7 @@ fn mesh_pdf_matches_its_samples() {
             let (point, normal) = place(&mut next);
             let Some(sample) = light.sample(point, normal, [next(), next()]) else { continue };
             let crate::lights::ShadowRayEnd::At(target) = sample.end else { panic!("a finite light") };
-            let crate::lights::LightSceneGeometry::Primitive(4, primitive) = sample.source else {
+            let crate::lights::GeometryOfLight::Primitive(4, primitive) = sample.source else {
                 panic!("expected a triangle")
             };
             let Emitter::Mesh(mesh) = &light.shape else { panic!("a mesh") };

@@ -2,7 +2,7 @@
 //! [`Bxdf::IS_INLINED`] is set, they inline the function instead.
 
 use super::BxdfPacket;
-use crate::materials::bsdf::{BsdfValues, DielectricSamplePacket, LobesToSample, ShownLobes};
+use crate::materials::bsdf::{BsdfValuePacket, DielectricSamplePacket, LobesToSample, ShownLobes};
 use crate::materials::bxdf::{Bxdf, ShadingGeometry};
 use crate::materials::rough_dielectric::DielectricBxdf;
 use crate::math::lanes::{F32x16, Mask, Simd, SimdKernel, Vec3x16};
@@ -68,7 +68,7 @@ impl<B: Bxdf> BxdfPacket<B> {
 
     /// [`BxdfPacket::f`].
     #[inline(always)]
-    pub(crate) fn f_out_of_line(&self, wi: &Vec3x16, simd: impl Simd) -> BsdfValues {
+    pub(crate) fn f_out_of_line(&self, wi: &Vec3x16, simd: impl Simd) -> BsdfValuePacket {
         if B::IS_INLINED { self.f(wi) } else { simd.call_out_of_line(EvaluationKernel { packet: self, wi }) }
     }
 
@@ -79,7 +79,7 @@ impl<B: Bxdf> BxdfPacket<B> {
         lobes: LobesToSample,
         normals: &Vec3x16,
         wi: &Vec3x16,
-        values: &BsdfValues,
+        values: &BsdfValuePacket,
         simd: impl Simd,
     ) -> F32x16 {
         if B::IS_INLINED {
@@ -161,10 +161,10 @@ struct EvaluationKernel<'a, B: Bxdf> {
 }
 
 impl<B: Bxdf> SimdKernel for EvaluationKernel<'_, B> {
-    type Output = BsdfValues;
+    type Output = BsdfValuePacket;
 
     #[inline(always)]
-    fn run(self, _: impl Simd) -> BsdfValues {
+    fn run(self, _: impl Simd) -> BsdfValuePacket {
         self.packet.f(self.wi)
     }
 }
@@ -175,7 +175,7 @@ struct PdfKernel<'a, B: Bxdf> {
     lobes: LobesToSample,
     normals: &'a Vec3x16,
     wi: &'a Vec3x16,
-    values: &'a BsdfValues,
+    values: &'a BsdfValuePacket,
 }
 
 impl<B: Bxdf> SimdKernel for PdfKernel<'_, B> {

@@ -28,7 +28,7 @@ pub use translucent::TranslucentPhong;
 use std::sync::Arc;
 
 use crate::materials::bsdf::{
-    BsdfValues, BxdfParameters, LobesToSample, NarrowLobe, ShownLobes, SpatiallyVaryingBxdf, UvPacket,
+    BsdfValuePacket, BxdfParameters, LobesToSample, NarrowLobe, ShownLobes, SpatiallyVaryingBxdf, UvPacket,
 };
 use crate::materials::bxdf::{Bxdf, ShadingGeometry, lobe_shading_normal};
 use crate::materials::bxdf_packet::BxdfPacket;
@@ -256,7 +256,7 @@ macro_rules! kinds {
                 shown: &[(u32, ShownLobes)],
                 simd: impl Simd,
             ) -> u32 {
-                let colors = material.packet_texture().zip(uv).map(|(texture, uv)| texture.lookup_packet(uv));
+                let colors = material.texture_for_packets().zip(uv).map(|(texture, uv)| texture.lookup_packet(uv));
                 match self {
                     $(Self::$kind(row) => {
                         let NonSpecular::$kind(material) = material else { return 0 };
@@ -293,7 +293,7 @@ macro_rules! kinds {
 
             /// [`BxdfPacket::f`].
             #[inline(always)]
-            pub fn f(&self, wi: &Vec3x16, simd: impl Simd) -> BsdfValues {
+            pub fn f(&self, wi: &Vec3x16, simd: impl Simd) -> BsdfValuePacket {
                 match self {
                     $(Self::$kind(row) => row.f_out_of_line(wi, simd),)+
                     $(Self::$part(row) => row.f_out_of_line(wi, simd)),+
@@ -307,7 +307,7 @@ macro_rules! kinds {
                 lobes: LobesToSample,
                 normals: &Vec3x16,
                 wi: &Vec3x16,
-                values: &BsdfValues,
+                values: &BsdfValuePacket,
                 simd: impl Simd,
             ) -> F32x16 {
                 match self {
@@ -473,9 +473,9 @@ impl NonSpecular {
     }
 
     /// Whether packets can be filled with the material by looking up at most one texture,
-    /// [`NonSpecular::packet_texture`].
+    /// [`NonSpecular::texture_for_packets`].
     pub fn supports_packets(&self) -> bool {
-        let color = self.packet_texture();
+        let color = self.texture_for_packets();
         // Packets are lit from only one side.
         !self.is_anisotropic()
             && !self.is_transmissive()
@@ -485,7 +485,7 @@ impl NonSpecular {
 
     /// The texture that packets look up, or `None` if there is no such texture.
     #[inline]
-    pub fn packet_texture(&self) -> Option<&Texture> {
+    pub fn texture_for_packets(&self) -> Option<&Texture> {
         self.packet_color_parameter()?.texture().map(|texture| &**texture)
     }
 }

@@ -1,7 +1,7 @@
 //! A packet whose functions are compiled once per kind of BSDF. The functions of [`BxdfPacket`] are always
 //! inlined, so calling them in many places would make the tests compile slowly.
 
-use crate::materials::bsdf::{BsdfValues, LobesToSample, ShownLobes};
+use crate::materials::bsdf::{BsdfValuePacket, LobesToSample, ShownLobes};
 use crate::materials::bxdf::{Bxdf, ShadingGeometry};
 use crate::materials::bxdf_packet::BxdfPacket;
 use crate::math::Vec3;
@@ -24,7 +24,7 @@ impl<B: Bxdf> TestPacket<B> {
     }
 
     #[inline(never)]
-    pub fn f(&self, wi: &Vec3x16) -> BsdfValues {
+    pub fn f(&self, wi: &Vec3x16) -> BsdfValuePacket {
         self.0.f(wi)
     }
 
@@ -34,7 +34,13 @@ impl<B: Bxdf> TestPacket<B> {
     }
 
     #[inline(never)]
-    pub fn pdf(&self, lobes: LobesToSample, normals: &Vec3x16, wi: &Vec3x16, values: &BsdfValues) -> F32x16 {
+    pub fn pdf(
+        &self,
+        lobes: LobesToSample,
+        normals: &Vec3x16,
+        wi: &Vec3x16,
+        values: &BsdfValuePacket,
+    ) -> F32x16 {
         self.0.pdf(lobes, normals, wi, values)
     }
 

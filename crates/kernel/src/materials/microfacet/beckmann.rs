@@ -15,7 +15,7 @@
 use std::f32::consts::{FRAC_2_SQRT_PI, LN_2};
 
 use crate::math::Vec3;
-use crate::math::elementary::{erf_and_gaussian, gaussian, gaussian_quantile, log2};
+use crate::math::elementary::{erf_and_gaussian, gaussian, half_variance_normal_quantile, log2};
 
 /// Number of Newton iterations, which reduce the error of H to less than 1e-6.
 const NEWTON_STEPS: u32 = 3;
@@ -40,7 +40,7 @@ pub fn sample_visible_normal(view: Vec3, u: [f32; 2]) -> Vec3 {
     let inverse = 1.0 / if is_upright { 1.0 } else { sine };
     let (x, y) = (if is_upright { 1.0 } else { view.x * inverse }, view.y * inverse);
     let along = sample_slope_along_view(view.z, sine, u[0]);
-    let across = gaussian_quantile(u[1].max(V_RANGE[0]).min(V_RANGE[1]));
+    let across = half_variance_normal_quantile(u[1].max(V_RANGE[0]).min(V_RANGE[1]));
     Vec3::new(across * y - along * x, -along * y - across * x, 1.0)
 }
 
@@ -57,11 +57,11 @@ fn sample_slope_along_view(cosine: f32, sine: f32, u: f32) -> f32 {
     let (erf, _) = erf_and_gaussian((-LN_2 * log2(u)).sqrt());
     let upright = cosine / (cosine + 2.0 * weight);
     let mut v = (end * (upright * u + (1.0 - upright) * (1.0 - erf))).max(V_RANGE[0]).min(end);
-    let mut slope = gaussian_quantile(v);
+    let mut slope = half_variance_normal_quantile(v);
     for _ in 0..NEWTON_STEPS {
         let missing = wanted - (cosine * v + weight * gaussian(slope));
         v = (v + missing / (cosine - slope * sine).max(1e-6)).max(V_RANGE[0]).min(end);
-        slope = gaussian_quantile(v);
+        slope = half_variance_normal_quantile(v);
     }
     slope
 }

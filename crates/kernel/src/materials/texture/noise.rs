@@ -45,7 +45,7 @@ const VARIANCE: f32 = 0.067_76;
 
 /// Value of the noise, and the variance that the filter has removed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FilteredNoise {
+pub struct FilteredNoiseValue {
     /// The value, in [−1, 1].
     pub value: f32,
     /// Variance of the faded octaves.
@@ -58,7 +58,7 @@ impl Noise {
     /// An octave of size s fades with smoothstep(s/w − 1), where w is the length of the footprint's longer axis:
     /// it is complete for s ≥ 2w, where it is sampled at least twice per lattice cell, and gone for s ≤ w. This
     /// clamps the number of octaves, as `FBm` of pbrt-v4 does, but also fades the first octave.
-    pub fn filtered(&self, at: &TexturePoint, is_filtered: bool) -> FilteredNoise {
+    pub fn filtered(&self, at: &TexturePoint, is_filtered: bool) -> FilteredNoiseValue {
         let (position, width) = object_position_and_width(at, is_filtered);
         let (mut value, mut removed_variance) = (0.0, 0.0);
         for octave in self.octaves(width) {
@@ -67,7 +67,7 @@ impl Noise {
                 value += octave.weight * octave.fade * octave.cell(position).value();
             }
         }
-        FilteredNoise { value, removed_variance }
+        FilteredNoiseValue { value, removed_variance }
     }
 
     /// Gradient of the noise in the shape's own coordinates, filtered like the value.
@@ -146,7 +146,7 @@ impl Octave {
 
 impl Cell {
     /// Values of the corners' linear functions.
-    fn ramps(&self) -> [f32; 8] {
+    fn corner_dot_products(&self) -> [f32; 8] {
         std::array::from_fn(|corner| {
             let axis = |axis: usize| (corner >> axis & 1) as f32;
             self.gradients[corner].dot(self.at - Vec3::new(axis(0), axis(1), axis(2)))
@@ -155,12 +155,12 @@ impl Cell {
 
     /// The noise, in [−1, 1].
     fn value(&self) -> f32 {
-        SCALE * interpolate_trilinearly(self.ramps(), self.at.to_array().map(quintic))
+        SCALE * interpolate_trilinearly(self.corner_dot_products(), self.at.to_array().map(quintic))
     }
 
     /// Derivatives of the noise with respect to the coordinates in the cell.
     fn gradient(&self) -> Vec3 {
-        let (ramps, weights) = (self.ramps(), self.at.to_array().map(quintic));
+        let (ramps, weights) = (self.corner_dot_products(), self.at.to_array().map(quintic));
         // The blended gradients of the ramps, and the ramps times the derivatives of their weights.
         let derivative = |axis: usize| {
             let blended = interpolate_trilinearly(self.gradients.map(|gradient| gradient[axis]), weights);

@@ -1,7 +1,7 @@
 //! Procedural textures: two colors, mixed by a pattern that is computed instead of stored.
 
 use super::mapping::TextureMapping;
-use super::noise::{FilteredNoise, Noise};
+use super::noise::{FilteredNoiseValue, Noise};
 use super::stripes::{Bands, Checker};
 use crate::materials::footprint::{ObjectPoint, TexturePoint};
 use crate::math::lanes::{PACKET_SIZE, Vec3x16, set_lane};
@@ -31,7 +31,7 @@ pub enum Pattern {
 
 /// Slopes of a height.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum HeightSlopes {
+pub enum HeightGradient {
     /// Derivatives along u and v.
     AlongUv(Vec2),
     /// The gradient in world coordinates. Its component along the normal has no meaning.
@@ -62,7 +62,7 @@ impl Pattern {
                 mix(cut(first), cut(second), self.second_color_share(at, is_filtered))
             }
             Self::Noise(noise) => {
-                let FilteredNoise { value, removed_variance } = noise.filtered(at, is_filtered);
+                let FilteredNoiseValue { value, removed_variance } = noise.filtered(at, is_filtered);
                 let mean = mix(first, second, share_from_noise(value));
                 // Approximate the distribution of the faded octaves by a parabola with the same variance, which
                 // is a fifth of its squared half width.
@@ -78,14 +78,14 @@ impl Pattern {
     }
 
     /// Slopes of the pattern.
-    fn slopes(&self, at: &TexturePoint, is_filtered: bool) -> HeightSlopes {
+    fn slopes(&self, at: &TexturePoint, is_filtered: bool) -> HeightGradient {
         match self {
-            Self::Checker(checker) => HeightSlopes::AlongUv(checker.slopes(at, is_filtered)),
-            Self::Bands(bands) => HeightSlopes::AlongUv(bands.slopes(at, is_filtered)),
+            Self::Checker(checker) => HeightGradient::AlongUv(checker.slopes(at, is_filtered)),
+            Self::Bands(bands) => HeightGradient::AlongUv(bands.slopes(at, is_filtered)),
             Self::Noise(noise) => {
                 let gradient = noise.value_gradient(at, is_filtered).as_dvec3() * 0.5;
                 let to_world = |object: &ObjectPoint| (object.from_world.transpose() * gradient).as_vec3();
-                HeightSlopes::World(at.object_point().map_or(Vec3::ZERO, to_world))
+                HeightGradient::World(at.object_point().map_or(Vec3::ZERO, to_world))
             }
         }
     }
@@ -144,11 +144,11 @@ impl PatternTexture {
     }
 
     /// Slopes of the red channel.
-    pub fn slopes(&self, at: &TexturePoint) -> HeightSlopes {
+    pub fn slopes(&self, at: &TexturePoint) -> HeightGradient {
         let height = self.colors[1].x - self.colors[0].x;
         match self.pattern.slopes(at, self.is_filtered) {
-            HeightSlopes::AlongUv(slopes) => HeightSlopes::AlongUv(slopes * height),
-            HeightSlopes::World(gradient) => HeightSlopes::World(gradient * height),
+            HeightGradient::AlongUv(slopes) => HeightGradient::AlongUv(slopes * height),
+            HeightGradient::World(gradient) => HeightGradient::World(gradient * height),
         }
     }
 
@@ -277,7 +277,7 @@ mod tests {
         );
         let world = DVec3::new(0.3, 1.7, -0.4);
         let at = |world: DVec3| object_point(from_world * world, 0.0, from_world);
-        let HeightSlopes::World(gradient) = texture.slopes(&at(world)) else { panic!("a gradient") };
+        let HeightGradient::World(gradient) = texture.slopes(&at(world)) else { panic!("a gradient") };
         let step = 1e-3;
         let change = |axis: DVec3| {
             let [a, b] = [-step, step].map(|step| texture.lookup(&at(world + axis * step)).x);

@@ -30,7 +30,7 @@ pub(crate) fn check_scene_before_import(scene: ForeignScene, path: &Path) -> Res
 }
 
 /// Reads the files to copy, and returns the names and contents of the copies.
-pub(crate) fn read_copied_files(
+pub(crate) fn read_files_to_copy(
     copies: Vec<CopiedFile>,
     token: &CancelToken,
 ) -> Result<Vec<(PathBuf, Vec<u8>)>, AssetError> {

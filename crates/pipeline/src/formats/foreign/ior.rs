@@ -42,13 +42,13 @@ pub(crate) fn dielectric_names() -> impl Iterator<Item = &'static str> {
 pub(crate) fn mean_fresnel_reflectance(eta: f64) -> f64 {
     const STEPS: u32 = 4096;
     let cosine = |index: u32| (f64::from(index) + 0.5) / f64::from(STEPS);
-    let sum: f64 = (0..STEPS).map(cosine).map(|mu| 2.0 * fresnel_reflectance(mu, eta) * mu).sum();
+    let sum: f64 = (0..STEPS).map(cosine).map(|mu| 2.0 * dielectric_reflectance(mu, eta) * mu).sum();
     sum / f64::from(STEPS)
 }
 
 /// Fresnel reflectance of a dielectric for unpolarized light. `cosine` ≥ 0 is the cosine of the angle of
 /// incidence.
-pub(crate) fn fresnel_reflectance(cosine: f64, eta: f64) -> f64 {
+pub(crate) fn dielectric_reflectance(cosine: f64, eta: f64) -> f64 {
     let sine_squared = (1.0 - cosine * cosine) / (eta * eta);
     if sine_squared >= 1.0 {
         return 1.0;
@@ -65,7 +65,7 @@ mod tests {
 
     #[test]
     fn mean_fresnel_matches_known_values() {
-        assert!((fresnel_reflectance(1.0, 1.5) - 0.04).abs() < 1e-12);
+        assert!((dielectric_reflectance(1.0, 1.5) - 0.04).abs() < 1e-12);
         // d'Eon and Irving (2011): 0.0918 from outside, and 1 − (1 − outside)/η² from inside.
         let (outside, inside) = (mean_fresnel_reflectance(1.5), mean_fresnel_reflectance(1.0 / 1.5));
         assert!((outside - 0.0918).abs() < 2e-4, "{outside}");

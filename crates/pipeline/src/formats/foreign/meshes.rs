@@ -31,13 +31,13 @@ impl MeshData {
     }
 
     /// The cross product of two edges of a triangle, whose length is twice its area.
-    fn area_vector(&self, [a, b, c]: [u32; 3]) -> DVec3 {
+    fn triangle_cross_product(&self, [a, b, c]: [u32; 3]) -> DVec3 {
         let [a, b, c] = [a, b, c].map(|vertex| self.positions[vertex as usize]);
         (b - a).cross(c - a)
     }
 
     /// The area of a triangle transformed by `matrix`.
-    pub(crate) fn transformed_area(&self, triangle: [u32; 3], matrix: &crate::math::DMat4) -> f64 {
+    pub(crate) fn transformed_triangle_area(&self, triangle: [u32; 3], matrix: &crate::math::DMat4) -> f64 {
         let [a, b, c] = triangle.map(|vertex| matrix.transform_point3(self.positions[vertex as usize]));
         0.5 * (b - a).cross(c - a).length()
     }
@@ -54,7 +54,7 @@ impl MeshData {
                 is_reversed
             } else {
                 let sum: DVec3 = triangle.iter().map(|vertex| self.normals[*vertex as usize]).sum();
-                self.area_vector(triangle).dot(sum) < 0.0
+                self.triangle_cross_product(triangle).dot(sum) < 0.0
             };
             if is_flipped {
                 self.triangles[index].swap(1, 2);
@@ -65,7 +65,7 @@ impl MeshData {
     /// Drops triangles without area.
     pub(crate) fn drop_degenerate_triangles(&mut self) {
         let mut triangles = std::mem::take(&mut self.triangles);
-        triangles.retain(|triangle| self.area_vector(*triangle).length_squared() > 0.0);
+        triangles.retain(|triangle| self.triangle_cross_product(*triangle).length_squared() > 0.0);
         self.triangles = triangles;
     }
 
@@ -80,7 +80,7 @@ impl MeshData {
         triangles.retain(|triangle| {
             let [a, b, c] = triangle.map(|vertex| self.positions[vertex as usize]);
             let longest = (b - a).length().max((c - b).length()).max((a - c).length());
-            self.area_vector(*triangle).length() > least * longest
+            self.triangle_cross_product(*triangle).length() > least * longest
         });
         self.triangles = triangles;
     }
@@ -124,7 +124,7 @@ impl MeshData {
     pub(crate) fn add_smooth_normals(&mut self) {
         let mut sums = vec![DVec3::ZERO; self.positions.len()];
         for triangle in &self.triangles {
-            let Some(normal) = self.area_vector(*triangle).try_normalize() else { continue };
+            let Some(normal) = self.triangle_cross_product(*triangle).try_normalize() else { continue };
             for corner in 0..3 {
                 let [at, next, last] =
                     [0, 1, 2].map(|step| self.positions[triangle[(corner + step) % 3] as usize]);
@@ -234,7 +234,7 @@ mod tests {
             let mut mesh = triangle();
             mesh.normals = normal.map_or(Vec::new(), |normal| vec![normal; 3]);
             mesh.orient(is_reversed);
-            assert_eq!(mesh.area_vector(mesh.triangles[0]), expected, "{normal:?} {is_reversed}");
+            assert_eq!(mesh.triangle_cross_product(mesh.triangles[0]), expected, "{normal:?} {is_reversed}");
             assert!(mesh.normals.iter().all(|normal| normal.dot(expected) > 0.0));
         }
     }
@@ -243,7 +243,7 @@ mod tests {
     fn surfaces_face_along_their_normals() {
         let mesh = MeshData::from_surface([3, 2], |uv| (DVec3::new(uv.x, uv.y, 0.0), DVec3::Z));
         assert_eq!((mesh.positions.len(), mesh.triangles.len()), (12, 12));
-        assert!(mesh.triangles.iter().all(|triangle| mesh.area_vector(*triangle).z > 0.0));
+        assert!(mesh.triangles.iter().all(|triangle| mesh.triangle_cross_product(*triangle).z > 0.0));
     }
 
     #[test]

@@ -35,7 +35,7 @@ impl SampledSpectrum {
     ///
     /// # Errors
     /// Returns the 1-based line number and the reason.
-    pub(crate) fn from_spd(text: &str) -> Result<Self, (usize, String)> {
+    pub(crate) fn parse_spd(text: &str) -> Result<Self, (usize, String)> {
         let mut points = Vec::new();
         for (index, line) in text.lines().enumerate() {
             let line = line.split('#').next().unwrap_or_default();
@@ -67,7 +67,7 @@ impl SampledSpectrum {
 }
 
 /// Interpolates x̄, ȳ, z̄ and the relative power of D65 at a wavelength in nanometers.
-fn observer_and_d65(wavelength: f64) -> [f64; 4] {
+fn interpolate_observer_and_d65(wavelength: f64) -> [f64; 4] {
     let position = (wavelength - FIRST) / STEP;
     let index = (position as usize).min(OBSERVER_AND_D65.len() - 2);
     let (before, after) = (OBSERVER_AND_D65[index], OBSERVER_AND_D65[index + 1]);
@@ -87,23 +87,23 @@ pub(crate) fn xyz_to_linear_rgb(xyz: DVec3) -> DVec3 {
 
 /// Integrates a spectrum to CIE XYZ. A spectrum that is 1 everywhere has luminance 1.
 pub(crate) fn spectrum_to_xyz(spectrum: impl Fn(f64) -> f64) -> DVec3 {
-    integrate(|wavelength, _| spectrum(wavelength), 1.0)
+    integrate_to_xyz(|wavelength, _| spectrum(wavelength), 1.0)
 }
 
 /// Integrates a reflectance under D65 to CIE XYZ. A reflectance of 1 has luminance 1.
 pub(crate) fn reflectance_to_xyz(spectrum: impl Fn(f64) -> f64) -> DVec3 {
-    let white = integrate(|_, d65| d65, 1.0).y;
-    integrate(|wavelength, d65| spectrum(wavelength) * d65, white)
+    let white = integrate_to_xyz(|_, d65| d65, 1.0).y;
+    integrate_to_xyz(|wavelength, d65| spectrum(wavelength) * d65, white)
 }
 
 /// Integrates a function of the wavelength and the power of D65 to CIE XYZ. A constant function with the
 /// value `norm` has luminance 1.
-fn integrate(value: impl Fn(f64, f64) -> f64, norm: f64) -> DVec3 {
+fn integrate_to_xyz(value: impl Fn(f64, f64) -> f64, norm: f64) -> DVec3 {
     let steps = ((LAST - FIRST) / INTEGRATION_STEP) as usize;
     let (mut sum, mut luminance) = (DVec3::ZERO, 0.0);
     for step in 0..steps {
         let wavelength = FIRST + (step as f64 + 0.5) * INTEGRATION_STEP;
-        let [x, y, z, d65] = observer_and_d65(wavelength);
+        let [x, y, z, d65] = interpolate_observer_and_d65(wavelength);
         sum += DVec3::new(x, y, z) * value(wavelength, d65);
         luminance += y;
     }
@@ -128,7 +128,7 @@ pub(crate) fn unbounded_color(spectrum: &SampledSpectrum) -> DVec3 {
 }
 
 /// Linear Rec. 709 color of an emission spectrum that is 1 everywhere: about (1.205, 0.948, 0.909).
-pub(crate) fn flat_emission_color() -> DVec3 {
+pub(crate) fn equal_energy_emission_color() -> DVec3 {
     xyz_to_linear_rgb(DVec3::ONE)
 }
 
@@ -157,7 +157,7 @@ mod tests {
     fn flat_spectra_have_known_colors() {
         let flat = SampledSpectrum::new(vec![[300.0, 1.0], [900.0, 1.0]]).expect("a spectrum");
         close(emission_color(&flat), [1.2048, 0.9483, 0.9089], 1e-3);
-        close(flat_emission_color(), [1.2048, 0.9483, 0.9089], 1e-3);
+        close(equal_energy_emission_color(), [1.2048, 0.9483, 0.9089], 1e-3);
         close(reflectance_color(&flat), [1.0, 1.0, 1.0], 2e-3);
     }
 
@@ -170,10 +170,10 @@ mod tests {
 
     #[test]
     fn spd_errors_have_lines() {
-        let spectrum = SampledSpectrum::from_spd("# nm\n400 1 # start\n\n500\t2\n").expect("a spectrum");
+        let spectrum = SampledSpectrum::parse_spd("# nm\n400 1 # start\n\n500\t2\n").expect("a spectrum");
         assert_eq!(spectrum.points, [[400.0, 1.0], [500.0, 2.0]]);
         for (text, line) in [("400 1\n500", 2), ("a 1", 1), ("400 1\n300 1", 2), ("", 1), ("400 1 2", 1)] {
-            assert_eq!(SampledSpectrum::from_spd(text).map_err(|(line, _)| line), Err(line), "{text:?}");
+            assert_eq!(SampledSpectrum::parse_spd(text).map_err(|(line, _)| line), Err(line), "{text:?}");
         }
     }
 

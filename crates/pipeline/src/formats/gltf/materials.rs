@@ -287,7 +287,7 @@ impl MaterialBuilder<'_, '_> {
         if let Some(known) = self.textures.get(&identity) {
             return known.clone();
         }
-        let wanted = self.scene.image_name(texture.image);
+        let wanted = self.scene.image_stem(texture.image);
         let name = self.names.make_unique(&wanted, "image");
         let TextureFileReference { file, image } = self.scene.image_file_reference(texture.image);
         let document = &mut self.scene.document;

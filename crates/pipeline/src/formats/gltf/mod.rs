@@ -10,7 +10,7 @@ use self::materials::{MaterialBuilder, TextureFileReference};
 use super::foreign::ForeignError;
 use super::frame::{CameraPose, FOV, frame_model, round_to_decimals_of_step};
 use super::model::{
-    DEFAULT_SIZE, Lighting, ModelViewOptions, POLISHED_ROUGHNESS, UsedNames, add_camera, add_ground,
+    DEFAULT_SIZE, Lighting, ModelViewOptions, POLISHED_ROUGHNESS, UsedNames, add_camera_table, add_ground,
     add_render_settings, add_sky_and_key_light, file_name, model_warning,
 };
 use super::rounding::{shorten, shorten_color, shorten_vector};
@@ -173,7 +173,7 @@ impl SceneBuilder<'_> {
         let eye = match own {
             Some(own) => {
                 let eye = camera_pose(own, bounds);
-                add_camera(&mut self.document, &eye, own.projection);
+                add_camera_table(&mut self.document, &eye, own.projection);
                 eye
             }
             None => {
@@ -184,7 +184,7 @@ impl SceneBuilder<'_> {
                     view.turns,
                     aspect.unwrap_or(DEFAULT_SIZE[0] / DEFAULT_SIZE[1]),
                 );
-                add_camera(&mut self.document, &eye, ModelProjection::Perspective { fov: FOV });
+                add_camera_table(&mut self.document, &eye, ModelProjection::Perspective { fov: FOV });
                 eye
             }
         };
@@ -208,7 +208,7 @@ impl SceneBuilder<'_> {
         let document = &mut self.document;
         document.start_list_table("light");
         if !light.name.is_empty() {
-            document.add_table_comment(&light.name);
+            document.add_comment_below_header(&light.name);
         }
         match light.kind {
             ModelLightKind::Point => {}
@@ -297,7 +297,7 @@ impl SceneBuilder<'_> {
     }
 
     /// Returns the name of an image, without an extension.
-    fn image_name(&self, image: usize) -> String {
+    fn image_stem(&self, image: usize) -> String {
         let name = self.image_names.get(image).filter(|name| !name.is_empty()).cloned();
         let of_file = || match self.container.locate_image(image) {
             Ok(ImageLocation::File(path)) => path.file_stem().map(|stem| stem.to_string_lossy().into_owned()),
@@ -334,7 +334,7 @@ impl SceneBuilder<'_> {
                     }),
                     Err(_) => "png".to_owned(),
                 };
-                let wanted = self.image_name(image);
+                let wanted = self.image_stem(image);
                 let name = self.add_exported_file(GltfPartOrImage::Image(image), &wanted, &ending);
                 TextureFileReference { file: name, image: None }
             }

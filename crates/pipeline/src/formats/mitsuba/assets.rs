@@ -14,7 +14,7 @@ impl SceneReader<'_> {
     /// Searches for a file. Watches the places before the one where it is found, or all of them if it does not
     /// exist.
     pub(super) fn find_file(&mut self, name: &str, span: &Range<usize>) -> Option<PathBuf> {
-        let own_folder = self.files.path_at(span).and_then(Path::parent);
+        let own_folder = self.files.path_of_span(span).and_then(Path::parent);
         let own = own_folder.map(|folder| folder.join(name));
         // Scenes written on Windows have backslashes in paths.
         let plain = name.replace('\\', "/");
@@ -70,7 +70,12 @@ impl SceneReader<'_> {
 
     /// Returns the name by which the document refers to an asset. Reports an error if the file does not
     /// exist, unless missing files are allowed.
-    pub(super) fn asset(&mut self, name: &str, span: &Range<usize>, kind: &str) -> Option<String> {
+    pub(super) fn resolve_asset_reference(
+        &mut self,
+        name: &str,
+        span: &Range<usize>,
+        kind: &str,
+    ) -> Option<String> {
         let path = self.asset_path(name, span, kind)?;
         Some(self.asset_reference(&path))
     }
@@ -84,7 +89,7 @@ impl SceneReader<'_> {
         match self.options.missing {
             MissingAssetMode::Error => {
                 let help = "add the file, or use --missing note to render without it".to_owned();
-                self.error(span.clone(), format!("{kind} not found: {}", shorten(name)), Some(help));
+                self.report_error(span.clone(), format!("{kind} not found: {}", shorten(name)), Some(help));
             }
             MissingAssetMode::Note => {
                 let text = match kind {
@@ -92,7 +97,11 @@ impl SceneReader<'_> {
                     "spectrum" => "not found; replaced by the default value",
                     _ => "not found; left out",
                 };
-                self.notes.substitute_light(&format!("{kind} {}", shorten(name)), text, span.clone());
+                self.notes.substitute_changing_lighting(
+                    &format!("{kind} {}", shorten(name)),
+                    text,
+                    span.clone(),
+                );
             }
         }
         None

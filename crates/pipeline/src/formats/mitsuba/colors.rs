@@ -9,7 +9,7 @@ use super::settings::span_of;
 use super::xml::shorten;
 use crate::assets::Companion;
 use crate::formats::foreign::spectra::{
-    SampledSpectrum, blackbody_radiance, emission_color, flat_emission_color, reflectance_color,
+    SampledSpectrum, blackbody_radiance, emission_color, equal_energy_emission_color, reflectance_color,
     spectrum_to_xyz, unbounded_color, xyz_to_linear_rgb,
 };
 use crate::math::DVec3;
@@ -42,13 +42,13 @@ impl<'a> SceneReader<'a> {
         let color = color.unwrap_or(DVec3::splat(default));
         if color.min_element() < 0.0 {
             let subject = format!("a negative `{}`", shorten(name));
-            self.notes.substitute_light(&subject, "replaced by 0", property.span.clone());
+            self.notes.substitute_changing_lighting(&subject, "replaced by 0", property.span.clone());
         }
         ColorSource::Constant(color.max(DVec3::ZERO))
     }
 
     fn color_of_child(&mut self, child: &Child, role: ColorRole) -> ColorSource {
-        let object = self.object(child.target);
+        let object = self.object_by_index(child.target);
         match object.kind {
             ObjectKind::Texture
                 if matches!(object.plugin.as_str(), "rawconstant" | "constant" | "srgb" | "uniform") =>
@@ -70,7 +70,7 @@ impl<'a> SceneReader<'a> {
             | ObjectKind::Shape
             | ObjectKind::Subsurface
             | ObjectKind::Volume => {
-                self.error(child.span.clone(), "expected a texture", None);
+                self.report_error(child.span.clone(), "expected a texture", None);
                 ColorSource::Constant(DVec3::splat(0.5))
             }
         }
@@ -154,7 +154,7 @@ impl<'a> SceneReader<'a> {
         match SampledSpectrum::new(points) {
             Ok(spectrum) => sampled_color(&spectrum, role),
             Err(reason) => {
-                self.error(object.span.clone(), reason, None);
+                self.report_error(object.span.clone(), reason, None);
                 DVec3::splat(0.5)
             }
         }
@@ -168,7 +168,7 @@ impl<'a> SceneReader<'a> {
     ) -> Option<DVec3> {
         match spectrum {
             SpectrumValue::Uniform(value) => Some(match role {
-                ColorRole::Emission => flat_emission_color() * *value,
+                ColorRole::Emission => equal_energy_emission_color() * *value,
                 ColorRole::Reflectance | ColorRole::Unbounded => DVec3::splat(*value),
             }),
             SpectrumValue::Sampled(spectrum) => Some(sampled_color(spectrum, role)),
@@ -184,15 +184,15 @@ impl<'a> SceneReader<'a> {
                     }
                     Err(error) => {
                         self.companions.push(Companion { path, hash: None, stamp: None });
-                        self.error(span.clone(), format!("cannot read the spectrum: {error}"), None);
+                        self.report_error(span.clone(), format!("cannot read the spectrum: {error}"), None);
                         return None;
                     }
                 };
-                match SampledSpectrum::from_spd(&text) {
+                match SampledSpectrum::parse_spd(&text) {
                     Ok(spectrum) => Some(sampled_color(&spectrum, role)),
                     Err((line, reason)) => {
                         let message = format!("{}:{line}: {reason}", path.display());
-                        self.error(span.clone(), message, None);
+                        self.report_error(span.clone(), message, None);
                         None
                     }
                 }
@@ -202,12 +202,12 @@ impl<'a> SceneReader<'a> {
 
     /// Returns a number from 0 to 1, or a texture. Limits other numbers and reports them.
     pub(super) fn fraction(&mut self, object: &'a PluginInstance, name: &str, default: f64) -> NumberSource {
-        match self.number(object, name, default) {
+        match self.number_or_texture(object, name, default) {
             NumberSource::Constant(number) if !(0.0..=1.0).contains(&number) => {
                 let subject =
                     format!("`{}` of `{}` outside of 0 to 1", shorten(name), shorten(&object.plugin));
                 let limited = number.clamp(0.0, 1.0);
-                self.notes.substitute_light(
+                self.notes.substitute_changing_lighting(
                     &subject,
                     &format!("replaced by {limited}"),
                     span_of(object, name),
@@ -219,7 +219,12 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Returns a number or texture.
-    pub(super) fn number(&mut self, object: &'a PluginInstance, name: &str, default: f64) -> NumberSource {
+    pub(super) fn number_or_texture(
+        &mut self,
+        object: &'a PluginInstance,
+        name: &str,
+        default: f64,
+    ) -> NumberSource {
         if let Some(child) = object.named_child(name) {
             return match self.color_of_child(child, ColorRole::Reflectance) {
                 ColorSource::Constant(color) => NumberSource::Constant(luminance(color)),

@@ -80,7 +80,7 @@ fn frame(tangent: DVec3) -> [DVec3; 2] {
 }
 
 /// Factor on the radius of a regular polygon that has the mean width of a circle.
-fn polygon_factor() -> f64 {
+fn mean_width_radius_factor() -> f64 {
     let half = PI / f64::from(SIDES);
     half / libm::sin(half)
 }
@@ -92,13 +92,13 @@ fn direction_around(tangent: DVec3, u: f64) -> DVec3 {
 }
 
 /// The tube of one segment of a spline.
-fn spline_segment(points: &[ControlPoint; 4]) -> MeshData {
+fn spline_segment_tube(points: &[ControlPoint; 4]) -> MeshData {
     MeshData::from_surface([SIDES, RINGS], |uv| {
         let at = spline_point(points, uv.y);
         let out = direction_around(at.tangent.normalize_or(DVec3::Z), uv.x) * at.radius;
         let bend = at.tangent.length_squared() - out.dot(at.curvature);
         let normal = out * bend - at.tangent * (at.slope * at.radius);
-        (at.center + out * polygon_factor(), normal.normalize_or(DVec3::Z))
+        (at.center + out * mean_width_radius_factor(), normal.normalize_or(DVec3::Z))
     })
 }
 
@@ -120,13 +120,13 @@ fn linear_segment([start, end]: [ControlPoint; 2]) -> MeshData {
         };
         let around = direction_around(axis, uv.x) * libm::cos(angle);
         let along = axis * libm::sin(angle);
-        let point = sphere.truncate() + (around * polygon_factor() + along) * sphere.w;
+        let point = sphere.truncate() + (around * mean_width_radius_factor() + along) * sphere.w;
         (point, (around + along).normalize_or(DVec3::Z))
     })
 }
 
 /// The part of a linear segment at a row of its mesh: 0 on the first sphere, 1 on the second one.
-fn linear_part(v: f64) -> f64 {
+fn snap_to_segment_end(v: f64) -> f64 {
     if v < 0.5 { 0.0 } else { 1.0 }
 }
 
@@ -141,16 +141,17 @@ fn tubes(curves: &[Vec<ControlPoint>], is_spline: bool) -> Option<MeshData> {
     let windows = curves.iter().flat_map(|curve| curve.windows(points).enumerate());
     for (index, (number, window)) in windows.enumerate() {
         let mut segment = match *window {
-            [a, b, c, d] => spline_segment(&[a, b, c, d]),
+            [a, b, c, d] => spline_segment_tube(&[a, b, c, d]),
             [a, b] => linear_segment([a, b]),
             _ => return None,
         };
         if !is_spline && number > 0 {
             // The previous segment ends with this sphere.
-            let is_start = |vertex: u32| linear_part(segment.uvs[vertex as usize].y) == 0.0;
+            let is_start = |vertex: u32| snap_to_segment_end(segment.uvs[vertex as usize].y) == 0.0;
             segment.triangles.retain(|triangle| !triangle.iter().all(|vertex| is_start(*vertex)));
         }
-        let along = |v: f64| (index as f64 + if is_spline { v } else { linear_part(v) }) / segments as f64;
+        let along =
+            |v: f64| (index as f64 + if is_spline { v } else { snap_to_segment_end(v) }) / segments as f64;
         segment.uvs.iter_mut().for_each(|uv| *uv = DVec2::new(uv.x, along(uv.y)));
         tubes.append(segment);
     }
@@ -163,7 +164,7 @@ impl<'a> SceneReader<'a> {
     pub(super) fn add_curves(&mut self, object: &'a PluginInstance, target: ShapeTarget<'_>) -> bool {
         let Some(matrix) = self.shape_transform(object) else { return false };
         let Some((name, span)) = self.text(object, "filename") else {
-            self.error(object.span.clone(), "the curves need `filename`", None);
+            self.report_error(object.span.clone(), "the curves need `filename`", None);
             return false;
         };
         let Some(path) = self.asset_path(name, &span, "curves") else { return false };
@@ -172,7 +173,7 @@ impl<'a> SceneReader<'a> {
         let text = bytes.and_then(|bytes| String::from_utf8(bytes).ok());
         let Some(curves) = text.and_then(|text| parse_curves(&text, &matrix)) else {
             let help = "a line has four numbers: x, y, z and the radius".to_owned();
-            self.error(span, "the curves cannot be read", Some(help));
+            self.report_error(span, "the curves cannot be read", Some(help));
             return false;
         };
         if curves.iter().map(Vec::len).sum::<usize>() > MAX_SEGMENTS {
@@ -181,7 +182,7 @@ impl<'a> SceneReader<'a> {
         }
         let Some(mesh) = tubes(&curves, object.plugin == "bsplinecurve") else {
             let message = "a curve has too few points: a B-spline needs four, a linear curve two";
-            self.error(span, message, None);
+            self.report_error(span, message, None);
             return false;
         };
         let text = "tubes of 32 sides; their ends are open, and Mitsuba does not show their inside";
@@ -213,7 +214,7 @@ mod tests {
     fn normals_of_tubes_are_perpendicular() {
         let points = [[0.0, 0.0, 0.0, 0.2], [1.0, 2.0, 0.0, 0.5], [3.0, 1.0, 1.0, 0.1], [4.0, 0.0, 3.0, 0.4]]
             .map(DVec4::from);
-        let mesh = spline_segment(&points);
+        let mesh = spline_segment_tube(&points);
         for triangle in &mesh.triangles {
             let [a, b, c] = triangle.map(|vertex| mesh.positions[vertex as usize]);
             let face = (b - a).cross(c - a).normalize();

@@ -32,18 +32,18 @@ const KNOWN_EMITTERS: [&str; 12] = [
 impl<'a> SceneReader<'a> {
     /// Whether an emitter is an area light that shapes can refer to.
     pub(super) fn is_named_area_light(&self, index: usize) -> bool {
-        let object = self.object(index);
+        let object = self.object_by_index(index);
         object.plugin == "area" && object.id.is_some()
     }
 
     /// Adds an emitter that does not belong to a shape.
     pub(super) fn add_emitter(&mut self, index: usize) {
-        let object = self.object(index);
+        let object = self.object_by_index(index);
         self.document.set_span_for_next_values(object.span.clone());
         match object.plugin.as_str() {
             "area" => {
                 let help = "put it in a <shape>".to_owned();
-                self.error(object.span.clone(), "an area light needs a shape", Some(help));
+                self.report_error(object.span.clone(), "an area light needs a shape", Some(help));
             }
             "point" => self.add_point_light(object),
             "spot" => self.add_spot_light(object),
@@ -65,7 +65,7 @@ impl<'a> SceneReader<'a> {
             ColorSource::Constant(color) => color,
             ColorSource::Texture(_) => {
                 let subject = format!("a texture in `{}`", shorten(&object.plugin));
-                self.notes.substitute_light(&subject, "replaced by white", span_of(object, name));
+                self.notes.substitute_changing_lighting(&subject, "replaced by white", span_of(object, name));
                 DVec3::ONE
             }
         }
@@ -78,14 +78,14 @@ impl<'a> SceneReader<'a> {
             None => self.world_matrix(object).w_axis.truncate(),
         };
         self.document.start_list_table("light");
-        self.set_light_name(object);
+        self.add_light_id_comment(object);
         self.document.set("position", position);
         self.document.set("intensity", shorten_color(intensity));
     }
 
-    fn set_light_name(&mut self, object: &'a PluginInstance) {
+    fn add_light_id_comment(&mut self, object: &'a PluginInstance) {
         if let Some(id) = &object.id {
-            self.document.add_table_comment(shorten(id));
+            self.document.add_comment_below_header(shorten(id));
         }
     }
 
@@ -98,20 +98,20 @@ impl<'a> SceneReader<'a> {
         if !(cutoff > 0.0 && cutoff < 180.0) || beam > cutoff {
             let message =
                 "the angles must satisfy 0 < `cutoff_angle` < 180 and `beam_width` ≤ `cutoff_angle`";
-            return self.error(span_of(object, "cutoff_angle"), message, None);
+            return self.report_error(span_of(object, "cutoff_angle"), message, None);
         }
         let position = matrix.w_axis.truncate();
         let Some(axis) = matrix.z_axis.truncate().try_normalize() else {
-            return self.error(object.span.clone(), "the light's `to_world` is degenerate", None);
+            return self.report_error(object.span.clone(), "the light's `to_world` is degenerate", None);
         };
         if let Some(texture) = object.named_child("texture")
             && !self.add_spot_texture(object, texture.target, cutoff)
         {
             let text = "the texture is left out";
-            self.notes.substitute_light("a spot light with a texture", text, object.span.clone());
+            self.notes.substitute_changing_lighting("a spot light with a texture", text, object.span.clone());
         }
         self.document.start_list_table("light");
-        self.set_light_name(object);
+        self.add_light_id_comment(object);
         self.document.set("type", "spot");
         self.document.set("position", position);
         self.document.set("look_at", position + axis);
@@ -127,10 +127,10 @@ impl<'a> SceneReader<'a> {
             None => self.world_matrix(object).z_axis.truncate(),
         };
         let Some(direction) = direction.try_normalize() else {
-            return self.error(object.span.clone(), "the light's direction is zero", None);
+            return self.report_error(object.span.clone(), "the light's direction is zero", None);
         };
         self.document.start_list_table("light");
-        self.set_light_name(object);
+        self.add_light_id_comment(object);
         self.document.set("type", "directional");
         self.document.set("direction", direction);
         self.document.set("irradiance", shorten_color(irradiance));
@@ -140,7 +140,7 @@ impl<'a> SceneReader<'a> {
     fn start_environment(&mut self, object: &'a PluginInstance) -> bool {
         if std::mem::replace(&mut self.has_environment, true) {
             let help = "remove one of them".to_owned();
-            self.error(object.span.clone(), "the scene has two environments", Some(help));
+            self.report_error(object.span.clone(), "the scene has two environments", Some(help));
             return false;
         }
         self.document.start_table("environment");
@@ -156,7 +156,7 @@ impl<'a> SceneReader<'a> {
 
     fn add_environment_map(&mut self, object: &'a PluginInstance) {
         let Some((name, span)) = self.text(object, "filename") else {
-            return self.error(object.span.clone(), "the environment map needs `filename`", None);
+            return self.report_error(object.span.clone(), "the environment map needs `filename`", None);
         };
         let scale = self.float(object, "scale").unwrap_or(1.0);
         let matrix = self.world_matrix(object);
@@ -170,9 +170,13 @@ impl<'a> SceneReader<'a> {
         let kind = extension(name);
         if !known.contains(&kind.as_str()) {
             let help = format!("convert it to one of {}", known.join(", "));
-            return self.error(span, format!("glimt cannot read .{} images", shorten(&kind)), Some(help));
+            return self.report_error(
+                span,
+                format!("glimt cannot read .{} images", shorten(&kind)),
+                Some(help),
+            );
         }
-        let Some(file) = self.asset(name, &span, "image") else {
+        let Some(file) = self.resolve_asset_reference(name, &span, "image") else {
             if self.options.missing == crate::formats::foreign::MissingAssetMode::Note
                 && self.start_environment(object)
             {
@@ -199,11 +203,15 @@ impl<'a> SceneReader<'a> {
     fn set_environment_matrix(&mut self, object: &'a PluginInstance, matrix: DMat3) {
         let axes = [matrix.x_axis, matrix.y_axis, matrix.z_axis].map(DVec3::try_normalize);
         let [Some(x), Some(y), Some(z)] = axes else {
-            return self.error(object.span.clone(), "the environment's `to_world` is degenerate", None);
+            return self.report_error(
+                object.span.clone(),
+                "the environment's `to_world` is degenerate",
+                None,
+            );
         };
         if x.cross(y).dot(z) < 0.0 || x.dot(y).abs().max(x.dot(z).abs()).max(y.dot(z).abs()) > 1e-4 {
             let text = "the map is only rotated, not mirrored or skewed";
-            self.notes.substitute_light(
+            self.notes.substitute_changing_lighting(
                 "an environment with a mirroring or skewed `to_world`",
                 text,
                 object.span.clone(),
@@ -273,10 +281,18 @@ impl<'a> SceneReader<'a> {
         let local = to_local * direction;
         let Some(local) = local.try_normalize().filter(|local| local.y > 0.0) else {
             let help = "choose a direction above the horizon".to_owned();
-            return self.error(span_of(object, "sun_direction"), "the sun is below the horizon", Some(help));
+            return self.report_error(
+                span_of(object, "sun_direction"),
+                "the sun is below the horizon",
+                Some(help),
+            );
         };
         if !(1.0..=10.0).contains(&turbidity) {
-            return self.error(span_of(object, "turbidity"), "`turbidity` must be between 1 and 10", None);
+            return self.report_error(
+                span_of(object, "turbidity"),
+                "`turbidity` must be between 1 and 10",
+                None,
+            );
         }
         let mut sky: TableEntries = vec![
             ("sun", local.into()),

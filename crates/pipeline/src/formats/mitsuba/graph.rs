@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use std::ops::Range;
 
 use super::property::{PropertyValue, SpectrumValue, TransformValue};
-use super::values::{self, ValueError, parse_float, parse_numbers, parse_point, property_name};
+use super::values::{self, ValueError, parse_float, parse_numbers, parse_point, to_snake_case_if_old};
 use super::xml::{Attribute, Element, MAX_ERRORS, shorten};
 use crate::control::CancelToken;
 use crate::math::{DMat4, DVec3};
@@ -165,7 +165,7 @@ impl<'a> GraphBuilder<'a> {
         Self { graph, ids, references, files, errors, overfull, token }
     }
 
-    fn error(&mut self, span: Range<usize>, message: impl Into<String>, help: Option<String>) {
+    fn report_error(&mut self, span: Range<usize>, message: impl Into<String>, help: Option<String>) {
         if self.errors.len() < MAX_ERRORS {
             self.errors.push(self.files.diagnostic(Severity::Error, span, message, "", help));
         }
@@ -186,7 +186,7 @@ impl<'a> GraphBuilder<'a> {
         let plugin = element.attribute("type");
         if plugin.is_none() && kind != ObjectKind::Scene {
             let help = format!("write <{} type=\"…\">", shorten(&element.tag));
-            self.error(element.span.clone(), "the attribute `type` is missing", Some(help));
+            self.report_error(element.span.clone(), "the attribute `type` is missing", Some(help));
             return None;
         }
         let (name, span) =
@@ -197,7 +197,7 @@ impl<'a> GraphBuilder<'a> {
             && self.ids.insert(id.clone(), index).is_some()
         {
             let span = element.attribute("id").map_or(element.span.clone(), |one| one.span.clone());
-            self.error(span, format!("the id `{}` is used twice", shorten(id)), None);
+            self.report_error(span, format!("the id `{}` is used twice", shorten(id)), None);
         }
         self.graph.objects.push(PluginInstance {
             kind,
@@ -226,7 +226,7 @@ impl<'a> GraphBuilder<'a> {
         let is_plugin_spectrum = tag == "spectrum" && element.attribute("type").is_some();
         let kind = OBJECT_TAGS.iter().find(|(name, _)| *name == tag).map(|(_, kind)| *kind);
         if let Some(kind) = kind.or(is_plugin_spectrum.then_some(ObjectKind::Spectrum)) {
-            let name = element.value("name").map(|name| property_name(name, element.is_old));
+            let name = element.value("name").map(|name| to_snake_case_if_old(name, element.is_old));
             if let Some(target) = self.add_object(element, kind) {
                 let span = element.span.clone();
                 self.graph.objects[parent].children.push(Child {
@@ -240,9 +240,9 @@ impl<'a> GraphBuilder<'a> {
         }
         match tag {
             "ref" => {
-                let Some(id) = self.required(element, "id") else { return };
+                let Some(id) = self.required_attribute(element, "id") else { return };
                 let (id, span) = (id.value.clone(), id.span.clone());
-                let name = element.value("name").map(|name| property_name(name, element.is_old));
+                let name = element.value("name").map(|name| to_snake_case_if_old(name, element.is_old));
                 let children = &mut self.graph.objects[parent].children;
                 let child = children.len();
                 let is_used = Cell::new(false);
@@ -250,7 +250,8 @@ impl<'a> GraphBuilder<'a> {
                 self.references.push(Reference { parent, child, id, span });
             }
             "alias" => {
-                let (Some(id), Some(copy)) = (self.required(element, "id"), self.required(element, "as"))
+                let (Some(id), Some(copy)) =
+                    (self.required_attribute(element, "id"), self.required_attribute(element, "as"))
                 else {
                     return;
                 };
@@ -258,7 +259,9 @@ impl<'a> GraphBuilder<'a> {
                     Some(&target) => {
                         self.ids.insert(copy.value.clone(), target);
                     }
-                    None => self.error(id.span.clone(), "no object before this alias has this id", None),
+                    None => {
+                        self.report_error(id.span.clone(), "no object before this alias has this id", None);
+                    }
                 }
             }
             _ if VALUE_TAGS.contains(&tag) => self.add_property(parent, element),
@@ -266,32 +269,32 @@ impl<'a> GraphBuilder<'a> {
                 let known = OBJECT_TAGS.iter().map(|(name, _)| *name).chain(VALUE_TAGS);
                 let help = nearest_name(tag, known.chain(["include", "default", "path"]));
                 let help = help.map(|near| format!("did you mean <{near}>?"));
-                self.error(element.span.clone(), format!("unknown element <{}>", shorten(tag)), help);
+                self.report_error(element.span.clone(), format!("unknown element <{}>", shorten(tag)), help);
             }
         }
     }
 
     /// Returns a required attribute, or reports an error.
-    fn required<'e>(&mut self, element: &'e Element, name: &str) -> Option<&'e Attribute> {
+    fn required_attribute<'e>(&mut self, element: &'e Element, name: &str) -> Option<&'e Attribute> {
         let found = element.attribute(name);
         if found.is_none() {
             let message = format!("<{}> needs the attribute `{name}`", shorten(&element.tag));
-            self.error(element.span.clone(), message, None);
+            self.report_error(element.span.clone(), message, None);
         }
         found
     }
 
     fn add_property(&mut self, parent: ObjectIndex, element: &Element) {
-        let Some(name) = self.required(element, "name") else { return };
-        let name = property_name(&name.value, element.is_old);
+        let Some(name) = self.required_attribute(element, "name") else { return };
+        let name = to_snake_case_if_old(&name.value, element.is_old);
         let value = match self.property_value(element) {
             Ok(value) => value,
-            Err(ValueError { span, message, help }) => return self.error(span, message, help),
+            Err(ValueError { span, message, help }) => return self.report_error(span, message, help),
         };
         let span = element.attribute("value").map_or(element.span.clone(), |value| value.span.clone());
         if self.graph.objects[parent].properties.len() >= MAX_PROPERTIES {
             if self.overfull.replace(parent) != Some(parent) {
-                self.error(span, format!("more than {MAX_PROPERTIES} properties"), None);
+                self.report_error(span, format!("more than {MAX_PROPERTIES} properties"), None);
             }
             return;
         }
@@ -299,7 +302,7 @@ impl<'a> GraphBuilder<'a> {
         if let Some(known) = properties.iter_mut().find(|known| known.name == name) {
             // Version 0.6 only warns about duplicates.
             if !element.is_old && known.value != value {
-                return self.error(span, format!("`{}` is specified twice", shorten(&name)), None);
+                return self.report_error(span, format!("`{}` is specified twice", shorten(&name)), None);
             }
             known.value = value;
             return;
@@ -336,7 +339,7 @@ impl<'a> GraphBuilder<'a> {
                 if let Some(file) = element.attribute("filename") {
                     return Ok(PropertyValue::Spectrum(SpectrumValue::File(file.value.clone())));
                 }
-                values::parse_spectrum(self.value_attribute(element)?)
+                values::parse_spectrum(self.required_value_attribute(element)?)
             }
             "tensor" => Err(ValueError {
                 span: element.span.clone(),
@@ -344,7 +347,7 @@ impl<'a> GraphBuilder<'a> {
                 help: None,
             }),
             tag => {
-                let attribute = self.value_attribute(element)?;
+                let attribute = self.required_value_attribute(element)?;
                 let (text, span) = (attribute.value.trim(), &attribute.span);
                 match tag {
                     "float" => parse_float(text, span).map(PropertyValue::Float),
@@ -363,7 +366,7 @@ impl<'a> GraphBuilder<'a> {
         }
     }
 
-    fn value_attribute<'e>(&self, element: &'e Element) -> Result<&'e Attribute, ValueError> {
+    fn required_value_attribute<'e>(&self, element: &'e Element) -> Result<&'e Attribute, ValueError> {
         element.attribute("value").ok_or_else(|| ValueError {
             span: element.span.clone(),
             message: format!("<{}> needs the attribute `value`", shorten(&element.tag)),
@@ -412,7 +415,7 @@ impl<'a> GraphBuilder<'a> {
                 None => {
                     let near = nearest_name(&id, self.ids.keys().map(String::as_str).take(4096));
                     let help = near.map(|near| format!("did you mean `{near}`?"));
-                    self.error(span, format!("no object has the id `{}`", shorten(&id)), help);
+                    self.report_error(span, format!("no object has the id `{}`", shorten(&id)), help);
                 }
             }
         }
@@ -436,7 +439,7 @@ impl<'a> GraphBuilder<'a> {
                     match states[target] {
                         NEW => stack.push((target, 0)),
                         OPEN => {
-                            self.error(
+                            self.report_error(
                                 span,
                                 "this object contains itself",
                                 Some("remove this reference".to_owned()),

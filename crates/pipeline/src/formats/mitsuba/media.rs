@@ -11,7 +11,7 @@ impl<'a> SceneReader<'a> {
     pub(super) fn interior_tint(&mut self, object: &'a PluginInstance) -> Option<DVec3> {
         let mut tint = None;
         for child in self.children_of_kind(object, ObjectKind::Medium) {
-            let medium = self.object(child.target);
+            let medium = self.object_by_index(child.target);
             let is_inside = matches!(child.name.as_deref(), None | Some("interior"));
             let absorption =
                 if is_inside && self.has_solid_glass(object) { self.pure_absorption(medium) } else { None };
@@ -22,7 +22,11 @@ impl<'a> SceneReader<'a> {
                 }
                 None => {
                     let subject = format!("medium `{}`", shorten(&medium.plugin));
-                    self.notes.substitute_light(&subject, "light passes it unchanged", medium.span.clone());
+                    self.notes.substitute_changing_lighting(
+                        &subject,
+                        "light passes it unchanged",
+                        medium.span.clone(),
+                    );
                 }
             }
         }
@@ -33,7 +37,7 @@ impl<'a> SceneReader<'a> {
     fn has_solid_glass(&self, object: &'a PluginInstance) -> bool {
         let bsdf = self.children_of_kind(object, ObjectKind::Bsdf).next();
         bsdf.is_some_and(|child| {
-            matches!(&*self.object(child.target).plugin, "dielectric" | "roughdielectric")
+            matches!(&*self.object_by_index(child.target).plugin, "dielectric" | "roughdielectric")
         })
     }
 

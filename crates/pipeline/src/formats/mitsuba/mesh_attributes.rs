@@ -72,7 +72,7 @@ impl<'a> SceneReader<'a> {
         let (mut faces, mut others, mut colors, mut bsdfs) = (0, 0, 0, 0);
         let mut visits = 0;
         while let Some(index) = pending.pop() {
-            let inner = self.object(index);
+            let inner = self.object_by_index(index);
             let is_texture = inner.kind == ObjectKind::Texture;
             let has_anisotropy = inner.properties.iter().any(|one| one.name == "alpha_u");
             if is_texture && is_attribute_texture(&inner.plugin) {
@@ -88,7 +88,7 @@ impl<'a> SceneReader<'a> {
             let is_diffuse = inner.plugin == "diffuse";
             let is_other_slot = |name: Option<&str>| !is_diffuse || name != Some("reflectance");
             for child in &inner.children {
-                let target = self.object(child.target);
+                let target = self.object_by_index(child.target);
                 if is_attribute_texture(&target.plugin)
                     && is_other_slot(child.name.as_deref())
                     && matches!(self.text(target, "name"), Some(("vertex_color", _)))
@@ -161,7 +161,7 @@ impl<'a> SceneReader<'a> {
 
     /// Returns the reflectance of a diffuse surface that multiplies the colors of vertices.
     pub(super) fn vertex_color_scale(&mut self, object: &'a PluginInstance) -> Option<BuiltValue> {
-        let texture = self.object(object.named_child("reflectance")?.target);
+        let texture = self.object_by_index(object.named_child("reflectance")?.target);
         let has_colors = self.attributes.as_ref().is_some_and(|mesh| !mesh.colors.is_empty());
         if !has_colors || !is_attribute_texture(&texture.plugin) {
             return None;

@@ -39,7 +39,7 @@ use self::reader::SceneReader;
 use self::shapes::ShapeTarget;
 use self::xml::XmlLoader;
 use super::foreign::ForeignError;
-use super::foreign::import::{CopiedFile, check_scene_before_import, read_copied_files};
+use super::foreign::import::{CopiedFile, check_scene_before_import, read_files_to_copy};
 use super::model::file_name;
 use super::{ForeignReadContext, ForeignScene, ImportedScene};
 use crate::assets::Companion;
@@ -59,7 +59,7 @@ pub(super) fn convert(
     check_scene_before_import(read(path, context)?, path)?;
     let (ForeignScene { document, notes, substitutions, .. }, copies) =
         read_scene(path, Some(folder), context)?;
-    let mut files = read_copied_files(copies, context.token)?;
+    let mut files = read_files_to_copy(copies, context.token)?;
     let generated = document.generated_files().iter();
     files.extend(generated.map(|(name, file)| (PathBuf::from(name), file.bytes.to_vec())));
     Ok(ImportedScene { document, files, substitutions, notes })
@@ -90,11 +90,11 @@ fn read_scene(
     drop(root);
     let mut reader = SceneReader::new(&graph, &sources.files, path, &folders, asset_folder, context);
     reader.document.add_comment_above_next_table(format!("{}, as glimt shows it.", file_name(path)));
-    let scene = reader.object(0);
+    let scene = reader.object_by_index(0);
     reader.add_settings(scene);
     for child in &scene.children {
         token.check_pause_and_cancel()?;
-        match reader.object(child.target).kind {
+        match reader.object_by_index(child.target).kind {
             ObjectKind::Shape => {
                 reader.add_shape(child.target, ShapeTarget::SCENE);
             }
@@ -125,7 +125,7 @@ fn read_scene(
     }
     let (notes, substitutions) = notes.into_diagnostics(&sources.files);
     let (hash, files) = (sources.hash, sources.files);
-    document.attach_files(files);
+    document.set_source_files(files);
     let copied = asset_names.into_iter().map(|(source, name)| CopiedFile { name, source }).collect();
     Ok((ForeignScene { document, hash, companions, notes, substitutions }, copied))
 }

@@ -6,7 +6,7 @@
 
 use std::f64::consts::TAU;
 
-use crate::formats::foreign::ior::{fresnel_reflectance, mean_fresnel_reflectance};
+use crate::formats::foreign::ior::{dielectric_reflectance, mean_fresnel_reflectance};
 
 /// Hemispherical integrals of a coat.
 #[derive(Clone, Copy, Debug)]
@@ -35,12 +35,14 @@ impl PlasticCoat {
                 glimt_internal_reflectance: internal_reflectance,
             };
         };
-        let facets = Facets { alpha, is_beckmann };
+        let facets = IsotropicMicrofacets { alpha, is_beckmann };
         let transmittance = mean_over_hemisphere(|cosine| facets.transmittance(cosine, eta));
-        let internal_reflectance =
-            mitsuba_mean(|cosine| facets.reflectance(cosine, 1.0 / eta, Masking::Separable));
-        let albedo =
-            mean_over_hemisphere(|cosine| facets.reflectance(cosine, eta, Masking::HeightCorrelated));
+        let internal_reflectance = mitsuba_hemisphere_mean(|cosine| {
+            facets.reflectance(cosine, 1.0 / eta, MaskingShadowingForm::Separable)
+        });
+        let albedo = mean_over_hemisphere(|cosine| {
+            facets.reflectance(cosine, eta, MaskingShadowingForm::HeightCorrelated)
+        });
         Self {
             transmittance_squared: transmittance * transmittance,
             internal_reflectance,
@@ -78,7 +80,7 @@ fn mean_over_hemisphere(value: impl Fn(f64) -> f64) -> f64 {
 
 /// Like [`mean_over_hemisphere`], but with Mitsuba's quadrature: 64 cosines from 0 to 1 with equal weights.
 /// The result is up to 1.6 % lower.
-fn mitsuba_mean(value: impl Fn(f64) -> f64) -> f64 {
+fn mitsuba_hemisphere_mean(value: impl Fn(f64) -> f64) -> f64 {
     const COUNT: u32 = 64;
     let at = |index: u32| (f64::from(index) / f64::from(COUNT - 1)).max(1e-6);
     2.0 * (0..COUNT).map(|index| value(at(index)) * at(index)).sum::<f64>() / f64::from(COUNT)
@@ -86,7 +88,7 @@ fn mitsuba_mean(value: impl Fn(f64) -> f64) -> f64 {
 
 /// How the masking of two directions is combined.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Masking {
+enum MaskingShadowingForm {
     /// The product of both directions' terms, as in Mitsuba.
     Separable,
     /// 1/(1 + Λᵢ + Λₒ), as in glimt.
@@ -95,27 +97,27 @@ enum Masking {
 
 /// An isotropic microfacet distribution.
 #[derive(Clone, Copy)]
-struct Facets {
+struct IsotropicMicrofacets {
     alpha: f64,
     is_beckmann: bool,
 }
 
-impl Facets {
+impl IsotropicMicrofacets {
     /// Single-scattering reflectance for a direction at `cosine` to the normal.
-    fn reflectance(self, cosine: f64, eta: f64, masking: Masking) -> f64 {
+    fn reflectance(self, cosine: f64, eta: f64, masking: MaskingShadowingForm) -> f64 {
         self.mean_over_facets(cosine, |along, [_, _, z], [_, _, mz]| {
             let out_z = 2.0 * along * mz - z;
             if out_z <= 0.0 {
                 return 0.0;
             }
-            fresnel_reflectance(along, eta) * self.masking(z, out_z, masking)
+            dielectric_reflectance(along, eta) * self.masking(z, out_z, masking)
         })
     }
 
     /// Single-scattering transmittance for a direction at `cosine` to the normal, with separable masking.
     fn transmittance(self, cosine: f64, eta: f64) -> f64 {
         self.mean_over_facets(cosine, |along, [_, _, z], [_, _, mz]| {
-            let reflectance = fresnel_reflectance(along, eta);
+            let reflectance = dielectric_reflectance(along, eta);
             let sine_squared = (1.0 - along * along) / (eta * eta);
             if sine_squared >= 1.0 {
                 return 0.0;
@@ -125,7 +127,7 @@ impl Facets {
             if out_z >= 0.0 {
                 return 0.0;
             }
-            (1.0 - reflectance) * self.masking(z, -out_z, Masking::Separable)
+            (1.0 - reflectance) * self.masking(z, -out_z, MaskingShadowingForm::Separable)
         })
     }
 
@@ -155,11 +157,11 @@ impl Facets {
         sum / f64::from(HEIGHTS * ANGLES)
     }
 
-    fn masking(self, cosine_in: f64, cosine_out: f64, masking: Masking) -> f64 {
+    fn masking(self, cosine_in: f64, cosine_out: f64, masking: MaskingShadowingForm) -> f64 {
         let (a, b) = (self.single_masking(cosine_in), self.single_masking(cosine_out));
         match masking {
-            Masking::Separable => a * b,
-            Masking::HeightCorrelated => 1.0 / (1.0 / a + 1.0 / b - 1.0),
+            MaskingShadowingForm::Separable => a * b,
+            MaskingShadowingForm::HeightCorrelated => 1.0 / (1.0 / a + 1.0 / b - 1.0),
         }
     }
 

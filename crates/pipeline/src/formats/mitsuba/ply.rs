@@ -1,6 +1,6 @@
 //! Attributes of the vertices and faces of PLY files, which Mitsuba's `mesh_attribute` uses.
 
-use crate::assets::mesh::ply::tables::{PlyTables, PropertyTable};
+use crate::assets::mesh::ply::tables::{PlyTables, PropertyValueTable};
 use crate::formats::foreign::meshes::MeshData;
 use crate::math::{DVec2, DVec3};
 
@@ -24,13 +24,15 @@ pub(super) struct MeshAttribute {
 
 /// Returns an attribute: the properties `NAME_0`, `NAME_1` and so on, or `r`, `g` and `b` for `color`. Only
 /// floating-point numbers are supported, because Mitsuba converts others.
-pub(super) fn attribute(table: &PropertyTable, name: &str) -> Option<MeshAttribute> {
+pub(super) fn attribute(table: &PropertyValueTable, name: &str) -> Option<MeshAttribute> {
     let numbered = [0, 1, 2].map(|index| format!("{name}_{index}"));
     let numbered = numbered.each_ref().map(String::as_str);
     let columns = table
-        .columns(&numbered)
-        .or_else(|| table.columns(&["r", "g", "b"]).filter(|_| name == "color"))
-        .or_else(|| table.columns(&numbered[..1]).filter(|_| table.columns(&numbered[1..2]).is_none()))?;
+        .column_indices(&numbered)
+        .or_else(|| table.column_indices(&["r", "g", "b"]).filter(|_| name == "color"))
+        .or_else(|| {
+            table.column_indices(&numbered[..1]).filter(|_| table.column_indices(&numbered[1..2]).is_none())
+        })?;
     if columns.iter().any(|column| !table.is_column_float(*column)) {
         return None;
     }
@@ -49,7 +51,7 @@ pub(super) fn face_attribute(tables: &PlyTables, name: &str) -> Option<MeshAttri
 /// Returns the mesh, or `None` if it has no triangles. Its normals are empty if the file has none.
 pub(super) fn triangle_mesh(tables: &PlyTables) -> Option<MeshData> {
     let vertices = &tables.vertices;
-    let uvs = vertices.columns(&["u", "v"]).or_else(|| vertices.columns(&["s", "t"]));
+    let uvs = vertices.column_indices(&["u", "v"]).or_else(|| vertices.column_indices(&["s", "t"]));
     let uv = |columns: Vec<usize>| {
         let of = |row| DVec2::new(vertices.value(row, columns[0]), vertices.value(row, columns[1]));
         (0..vertices.row_count()).map(of).collect()

@@ -116,7 +116,7 @@ impl<'a> SceneReader<'a> {
         forward: DVec3,
     ) -> DVec3 {
         for child in self.children_of_kind(scene, ObjectKind::Emitter) {
-            let light = self.object(child.target);
+            let light = self.object_by_index(child.target);
             let has_pane = light.plugin == "projector"
                 || light.plugin == "spot" && light.named_child("texture").is_some();
             let Some(frame) = has_pane.then(|| self.light_frame(light)).flatten() else { continue };
@@ -158,7 +158,7 @@ impl<'a> SceneReader<'a> {
         texture: ObjectIndex,
         cutoff: f64,
     ) -> bool {
-        let bitmap = self.object(texture);
+        let bitmap = self.object_by_index(texture);
         let is_bounded = bitmap.plugin == "bitmap"
             && self.text(bitmap, "filename").is_some_and(|(name, _)| !is_float_image(&extension(name)));
         let half = libm::tan(cutoff.to_radians());
@@ -166,7 +166,8 @@ impl<'a> SceneReader<'a> {
             return false;
         }
         let Some(frame) = self.pane_frame(object) else { return false };
-        let Some(name) = self.texture(texture, MitsubaTextureUse::Color, UvConvention::default()) else {
+        let Some(name) = self.find_or_add_texture(texture, MitsubaTextureUse::Color, UvConvention::default())
+        else {
             return false;
         };
         let material = self.add_pane_material(&name);
@@ -181,7 +182,7 @@ impl<'a> SceneReader<'a> {
                 Some(Pixels { width: 1, height: 1, values: vec![color.as_vec3()] })
             }
             ColorSource::Texture(texture) => {
-                let bitmap = self.object(texture);
+                let bitmap = self.object_by_index(texture);
                 if bitmap.plugin != "bitmap" || bitmap.property("to_uv").is_some() {
                     self.refuse(object, "projectors without an image");
                     return None;
@@ -204,7 +205,7 @@ impl<'a> SceneReader<'a> {
                         Some(Pixels { width, height, values: (0..width * height).map(color).collect() })
                     }
                     Err(error) => {
-                        self.error(span, error.to_string(), None);
+                        self.report_error(span, error.to_string(), None);
                         None
                     }
                 }

@@ -173,11 +173,11 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Counts a shape. Returns whether it may be added.
-    pub(super) fn count_shape(&mut self, object: &PluginInstance) -> bool {
+    pub(super) fn count_shape_and_check_limit(&mut self, object: &PluginInstance) -> bool {
         self.shape_count += 1;
         if self.shape_count > MAX_SHAPES && !self.has_stopped {
             let help = "combine them in meshes, or use instances of a `shapegroup`".to_owned();
-            self.error(
+            self.report_error(
                 object.span.clone(),
                 format!("more than {MAX_SHAPES} shapes and instances"),
                 Some(help),
@@ -191,14 +191,14 @@ impl<'a> SceneReader<'a> {
     pub(super) fn may_add_material(&mut self, reference: &Range<usize>) -> bool {
         if self.material_count >= MAX_MATERIALS && !self.has_stopped {
             let help = "let shapes share their BSDFs, and nest fewer blends".to_owned();
-            self.error(reference.clone(), format!("more than {MAX_MATERIALS} materials"), Some(help));
+            self.report_error(reference.clone(), format!("more than {MAX_MATERIALS} materials"), Some(help));
             self.has_stopped = true;
         }
         !self.must_stop()
     }
 
     /// Whether a predicate is true for any of the objects or any object in them.
-    pub(super) fn any_nested(
+    pub(super) fn any_nested_object_satisfies(
         &self,
         objects: impl IntoIterator<Item = ObjectIndex>,
         is_found: impl Fn(&PluginInstance) -> bool,
@@ -210,7 +210,7 @@ impl<'a> SceneReader<'a> {
             if !visited.insert(index) {
                 continue;
             }
-            let object = self.object(index);
+            let object = self.object_by_index(index);
             if is_found(object) {
                 return true;
             }
@@ -220,12 +220,17 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Returns an object. The result does not borrow the reader.
-    pub(super) fn object(&self, index: ObjectIndex) -> &'a PluginInstance {
+    pub(super) fn object_by_index(&self, index: ObjectIndex) -> &'a PluginInstance {
         &self.graph.objects[index]
     }
 
     /// Reports an error, unless there are `MAX_ERRORS` already.
-    pub(super) fn error(&mut self, span: Range<usize>, message: impl Into<String>, help: Option<String>) {
+    pub(super) fn report_error(
+        &mut self,
+        span: Range<usize>,
+        message: impl Into<String>,
+        help: Option<String>,
+    ) {
         if self.errors.len() < MAX_ERRORS {
             self.errors.push(self.files.diagnostic(Severity::Error, span, message, "", help));
         }
@@ -236,7 +241,7 @@ impl<'a> SceneReader<'a> {
     pub(super) fn refuse(&mut self, object: &PluginInstance, what: &str) {
         let message = format!("glimt does not render {what} (`{}`)", shorten(&object.plugin));
         let help = "remove it, or render this scene with Mitsuba".to_owned();
-        self.error(object.span.clone(), message, Some(help));
+        self.report_error(object.span.clone(), message, Some(help));
     }
 
     /// Reports an unknown plugin, and suggests a similar name from `known`.
@@ -246,7 +251,11 @@ impl<'a> SceneReader<'a> {
             Some(near) => format!("did you mean `{near}`?"),
             None => format!("expected one of {}", known.join(", ")),
         };
-        self.error(object.span.clone(), format!("unknown {kind} `{}`", shorten(&object.plugin)), Some(help));
+        self.report_error(
+            object.span.clone(),
+            format!("unknown {kind} `{}`", shorten(&object.plugin)),
+            Some(help),
+        );
     }
 
     pub(super) fn wrong_type(
@@ -257,7 +266,7 @@ impl<'a> SceneReader<'a> {
         found: &PropertyValue,
     ) {
         let message = format!("`{}` must be {expected}, found {}", shorten(name), found.type_name());
-        self.error(span.clone(), message, None);
+        self.report_error(span.clone(), message, None);
     }
 
     /// Returns a numeric property. Other types are errors.
@@ -375,7 +384,7 @@ impl<'a> SceneReader<'a> {
             "strict_normals",
             "approximate",
         ];
-        let object = self.object(index);
+        let object = self.object_by_index(index);
         if !self.reported_unused.insert(index) {
             return;
         }

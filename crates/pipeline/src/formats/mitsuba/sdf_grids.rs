@@ -58,7 +58,7 @@ impl DistanceGrid {
     }
 
     /// The value at a point of the grid, in voxels.
-    fn value(&self, at: DVec3) -> f64 {
+    fn value_at_voxel_corner(&self, at: DVec3) -> f64 {
         let [x, y, z] = at.to_array().map(|index| index as usize);
         let [width, height, _] = self.size;
         f64::from(self.values[x + width * (y + height * z)])
@@ -66,11 +66,11 @@ impl DistanceGrid {
 
     /// Values at the corners of a voxel.
     fn corners(&self, voxel: DVec3) -> [f64; 8] {
-        [0, 1, 2, 3, 4, 5, 6, 7].map(|corner| self.value(voxel + corner_offset(corner)))
+        [0, 1, 2, 3, 4, 5, 6, 7].map(|corner| self.value_at_voxel_corner(voxel + corner_offset(corner)))
     }
 
     /// Number of voxels per axis.
-    fn voxels(&self) -> DVec3 {
+    fn voxels_per_axis(&self) -> DVec3 {
         DVec3::from(self.size.map(|size| size as f64)) - DVec3::ONE
     }
 
@@ -84,10 +84,10 @@ impl DistanceGrid {
         for corner in 0..8 {
             let offset = corner_offset(corner);
             let voxel = first + offset;
-            let last = self.voxels() - DVec3::ONE;
+            let last = self.voxels_per_axis() - DVec3::ONE;
             let inside = voxel.clamp(DVec3::ZERO, last);
             let parts = offset * weight + (DVec3::ONE - offset) * (DVec3::ONE - weight);
-            let gradient = gradient(&self.corners(inside), at - inside) * self.voxels();
+            let gradient = gradient(&self.corners(inside), at - inside) * self.voxels_per_axis();
             sum += gradient.normalize_or_zero() * parts.element_product();
         }
         sum.normalize_or(DVec3::Z)
@@ -117,7 +117,7 @@ impl DistanceGrid {
     }
 
     fn add_voxel(&self, mesh: &mut MeshData, voxel: DVec3, corners: &[f64; 8], is_smooth: bool) {
-        let scale = self.voxels();
+        let scale = self.voxels_per_axis();
         for cell in 0..CELLS.pow(3) {
             let cell = [cell % CELLS, cell / CELLS % CELLS, cell / (CELLS * CELLS)];
             let cell = DVec3::from(cell.map(f64::from));
@@ -145,7 +145,7 @@ impl DistanceGrid {
 }
 
 /// Trilinear interpolation in a voxel.
-fn interpolate(corners: &[f64; 8], at: DVec3) -> f64 {
+fn interpolate_trilinearly(corners: &[f64; 8], at: DVec3) -> f64 {
     let weight = |corner: u32| {
         let offset = corner_offset(corner);
         (offset * at + (DVec3::ONE - offset) * (DVec3::ONE - at)).element_product()
@@ -158,7 +158,7 @@ fn gradient(corners: &[f64; 8], at: DVec3) -> DVec3 {
     let along = |axis: usize| {
         let (mut low, mut high) = (at, at);
         (low[axis], high[axis]) = (0.0, 1.0);
-        interpolate(corners, high) - interpolate(corners, low)
+        interpolate_trilinearly(corners, high) - interpolate_trilinearly(corners, low)
     };
     DVec3::new(along(0), along(1), along(2))
 }
@@ -167,7 +167,7 @@ fn gradient(corners: &[f64; 8], at: DVec3) -> DVec3 {
 fn root_between(corners: &[f64; 8], mut inside: DVec3, mut outside: DVec3) -> DVec3 {
     for _ in 0..24 {
         let middle = (inside + outside) / 2.0;
-        *(if interpolate(corners, middle) < 0.0 { &mut inside } else { &mut outside }) = middle;
+        *(if interpolate_trilinearly(corners, middle) < 0.0 { &mut inside } else { &mut outside }) = middle;
     }
     (inside + outside) / 2.0
 }
@@ -176,7 +176,8 @@ fn root_between(corners: &[f64; 8], mut inside: DVec3, mut outside: DVec3) -> DV
 fn tetrahedron_surface(points: &[DVec3; 4], corners: &[f64; 8]) -> Vec<[DVec3; 3]> {
     let (mut inside, mut outside) = (Vec::new(), Vec::new());
     for point in points {
-        (if interpolate(corners, *point) < 0.0 { &mut inside } else { &mut outside }).push(*point);
+        (if interpolate_trilinearly(corners, *point) < 0.0 { &mut inside } else { &mut outside })
+            .push(*point);
     }
     let root = |a: usize, b: usize| root_between(corners, inside[a], outside[b]);
     match (inside.len(), outside.len()) {
@@ -195,14 +196,14 @@ impl<'a> SceneReader<'a> {
     pub(super) fn add_distance_grid(&mut self, object: &'a PluginInstance, target: ShapeTarget<'_>) -> bool {
         let Some(matrix) = self.shape_transform(object) else { return false };
         let Some((name, span)) = self.text(object, "filename") else {
-            self.error(object.span.clone(), "the grid needs `filename`", None);
+            self.report_error(object.span.clone(), "the grid needs `filename`", None);
             return false;
         };
         let is_smooth = match self.text(object, "normals") {
             None | Some(("smooth", _)) => true,
             Some(("analytic", _)) => false,
             Some((_, span)) => {
-                self.error(span, "`normals` must be smooth or analytic", None);
+                self.report_error(span, "`normals` must be smooth or analytic", None);
                 return false;
             }
         };
@@ -211,7 +212,7 @@ impl<'a> SceneReader<'a> {
         let bytes = self.read_watched_file(&path, MAX_BYTES);
         let Some(grid) = bytes.and_then(|bytes| DistanceGrid::parse(&bytes)) else {
             let help = "glimt reads version 3 of the format with one channel of 32-bit floats".to_owned();
-            self.error(span, "the grid cannot be read", Some(help));
+            self.report_error(span, "the grid cannot be read", Some(help));
             return false;
         };
         let Some(mut mesh) = grid.surface(is_smooth) else {

@@ -86,19 +86,19 @@ impl<'a> SceneReader<'a> {
     pub(super) fn add_settings(&mut self, scene: &'a PluginInstance) {
         let Some(sensor) = self.select_sensor(scene) else { return };
         let sensor_index = sensor.target;
-        let sensor = self.object(sensor_index);
+        let sensor = self.object_by_index(sensor_index);
         if let Some(medium) = self.children_of_kind(sensor, ObjectKind::Medium).next() {
             let text = "the camera is in a vacuum";
-            self.notes.substitute_light("a sensor in a medium", text, medium.span.clone());
+            self.notes.substitute_changing_lighting("a sensor in a medium", text, medium.span.clone());
         }
         let film = self.children_of_kind(sensor, ObjectKind::Film).next().map(|child| child.target);
-        let window = self.film_window(film.map(|index| self.object(index)));
+        let window = self.film_window(film.map(|index| self.object_by_index(index)));
         self.document.set_span_for_next_values(sensor.span.clone());
         self.document.start_table("render");
         self.document.set("width", window.crop_size[0]);
         self.document.set("height", window.crop_size[1]);
         let sampler = self.children_of_kind(sensor, ObjectKind::Sampler).next();
-        let samples = sampler.map(|child| self.object(child.target));
+        let samples = sampler.map(|child| self.object_by_index(child.target));
         let count = samples.and_then(|object| self.integer(object, "sample_count")).unwrap_or(4);
         if count < 1
             && let Some(sampler) = samples
@@ -107,7 +107,7 @@ impl<'a> SceneReader<'a> {
         }
         self.document.set("samples", count.clamp(1, i64::from(u32::MAX)) as f64);
         self.add_integrator(scene);
-        self.add_filter(film.map(|index| self.object(index)));
+        self.add_filter(film.map(|index| self.object_by_index(index)));
         self.add_camera(scene, sensor, &window);
         self.report_unused_settings(scene, sensor_index);
     }
@@ -117,7 +117,7 @@ impl<'a> SceneReader<'a> {
         let sensors: Vec<&Child> = self.children_of_kind(scene, ObjectKind::Sensor).collect();
         if sensors.is_empty() {
             let help = "add a <sensor>, or open the file that includes this one".to_owned();
-            self.error(scene.span.clone(), "the scene has no sensor", Some(help));
+            self.report_error(scene.span.clone(), "the scene has no sensor", Some(help));
             return None;
         }
         let wanted = self.options.sensor.as_deref();
@@ -128,18 +128,23 @@ impl<'a> SceneReader<'a> {
             }
             return sensors.first().copied();
         };
-        let by_name = sensors.iter().find(|child| self.object(child.target).id.as_deref() == Some(wanted));
+        let by_name =
+            sensors.iter().find(|child| self.object_by_index(child.target).id.as_deref() == Some(wanted));
         let by_number = || sensors.get(wanted.parse::<usize>().ok()?.checked_sub(1)?);
         let found = by_name.or_else(by_number).copied();
         if found.is_none() {
-            let name = |(index, child): (usize, &&Child)| match &self.object(child.target).id {
+            let name = |(index, child): (usize, &&Child)| match &self.object_by_index(child.target).id {
                 Some(id) => format!("{} ({})", index + 1, shorten(id)),
                 None => (index + 1).to_string(),
             };
             let names: Vec<_> = sensors.iter().enumerate().take(20).map(name).collect();
             let help = format!("the sensors are {}", names.join(", "));
             let span = sensors[0].span.clone();
-            self.error(span, format!("--sensor: there is no sensor `{}`", shorten(wanted)), Some(help));
+            self.report_error(
+                span,
+                format!("--sensor: there is no sensor `{}`", shorten(wanted)),
+                Some(help),
+            );
         }
         found
     }
@@ -152,7 +157,7 @@ impl<'a> SceneReader<'a> {
             "hdrfilm" | "ldrfilm" | "mfilm" | "tiledhdrfilm" | "pngfilm" | "exrfilm" => {}
             "specfilm" => {
                 let text = "rendered with the colors of the CIE observer instead of the film's channels";
-                self.notes.substitute_light("`specfilm`", text, film.span.clone());
+                self.notes.substitute_changing_lighting("`specfilm`", text, film.span.clone());
             }
             _ => self.unknown_plugin(film, "film", &["hdrfilm", "ldrfilm", "specfilm"]),
         }
@@ -177,7 +182,7 @@ impl<'a> SceneReader<'a> {
             let value = self.integer(film, name).unwrap_or(default);
             if !(1..=MAX_SIZE).contains(&value) {
                 let span = film.property(name).map_or(film.span.clone(), |property| property.span.clone());
-                self.error(span, format!("`{name}` must be between 1 and {MAX_SIZE}"), None);
+                self.report_error(span, format!("`{name}` must be between 1 and {MAX_SIZE}"), None);
                 return default;
             }
             value
@@ -187,7 +192,7 @@ impl<'a> SceneReader<'a> {
         let x = self.integer(film, "crop_offset_x").unwrap_or(0);
         let y = self.integer(film, "crop_offset_y").unwrap_or(0);
         if x < 0 || y < 0 || x.saturating_add(crop_width) > width || y.saturating_add(crop_height) > height {
-            self.error(film.span.clone(), "the crop window extends beyond the film", None);
+            self.report_error(film.span.clone(), "the crop window extends beyond the film", None);
             return full(width, height);
         }
         FilmWindow {
@@ -199,7 +204,7 @@ impl<'a> SceneReader<'a> {
 
     fn add_filter(&mut self, film: Option<&'a PluginInstance>) {
         let filter = film.and_then(|film| self.children_of_kind(film, ObjectKind::Filter).next());
-        let Some(filter) = filter.map(|child| self.object(child.target)) else {
+        let Some(filter) = filter.map(|child| self.object_by_index(child.target)) else {
             self.document.set("filter", "gaussian");
             return;
         };
@@ -252,7 +257,7 @@ impl<'a> SceneReader<'a> {
         let mut nested = 0;
         // Integrators that add channels wrap the integrator that computes the light.
         while let Some(child) = integrator {
-            let object = self.object(child.target);
+            let object = self.object_by_index(child.target);
             if !WRAPPERS.contains(&object.plugin.as_str()) || nested > 8 {
                 break;
             }
@@ -270,7 +275,7 @@ impl<'a> SceneReader<'a> {
             }
             (integrator, nested) = (inner, nested + 1);
         }
-        let Some(integrator) = integrator.map(|child| self.object(child.target)) else {
+        let Some(integrator) = integrator.map(|child| self.object_by_index(child.target)) else {
             self.document.set("integrator", "path");
             self.document.set("max_depth", UNLIMITED_DEPTH);
             return;
@@ -314,7 +319,11 @@ impl<'a> SceneReader<'a> {
             }
             "depth" | "ao" | "field" | "normals" | "albedo" => {
                 let text = "replaced by `path`; --view shows normals, albedo and depth";
-                self.notes.substitute_light(&format!("`{plugin}`"), text, integrator.span.clone());
+                self.notes.substitute_changing_lighting(
+                    &format!("`{plugin}`"),
+                    text,
+                    integrator.span.clone(),
+                );
                 self.document.set("integrator", "path");
                 self.document.set("max_depth", depth);
             }
@@ -337,14 +346,14 @@ impl<'a> SceneReader<'a> {
         let [Some(across), Some(up), Some(forward)] =
             [linear.x_axis, linear.y_axis, linear.z_axis].map(|axis| axis.try_normalize())
         else {
-            self.error(sensor.span.clone(), "the sensor's `to_world` is degenerate", None);
+            self.report_error(sensor.span.clone(), "the sensor's `to_world` is degenerate", None);
             return;
         };
         let skew = across.dot(up).abs().max(across.dot(forward).abs()).max(up.dot(forward).abs());
         let [width, height, depth] = [linear.x_axis, linear.y_axis, linear.z_axis].map(DVec3::length);
         if skew > 1e-4 || (width / height - 1.0).abs() > 1e-4 {
             let text = "rendered without skew or stretch";
-            self.notes.substitute_light(
+            self.notes.substitute_changing_lighting(
                 "a sensor with a skewed or stretched `to_world`",
                 text,
                 sensor.span.clone(),
@@ -449,7 +458,7 @@ impl<'a> SceneReader<'a> {
         };
         if !(angle > 0.0 && angle < std::f64::consts::PI) {
             let span = sensor.property("fov").map_or(sensor.span.clone(), |property| property.span.clone());
-            self.error(span, "`fov` must be between 0 and 180 degrees", None);
+            self.report_error(span, "`fov` must be between 0 and 180 degrees", None);
             return 0.5;
         }
         let half = libm::tan(angle / 2.0);
@@ -463,7 +472,7 @@ impl<'a> SceneReader<'a> {
             "diagonal" => half / libm::sqrt(1.0 + aspect * aspect),
             other => {
                 let help = "expected x, y, diagonal, smaller or larger".to_owned();
-                self.error(span, format!("unknown axis `{}`", shorten(other)), Some(help));
+                self.report_error(span, format!("unknown axis `{}`", shorten(other)), Some(help));
                 half
             }
         }
@@ -475,7 +484,7 @@ impl<'a> SceneReader<'a> {
         let Some((text, span)) = self.text(sensor, "focal_length") else { return DEFAULT };
         let number = text.trim().trim_end_matches("mm").trim().parse::<f64>().ok();
         number.filter(|length| *length > 0.0 && length.is_finite()).unwrap_or_else(|| {
-            self.error(span, "expected a focal length such as 50mm", None);
+            self.report_error(span, "expected a focal length such as 50mm", None);
             DEFAULT
         })
     }

@@ -61,17 +61,17 @@ impl ShapeTarget<'_> {
 impl<'a> SceneReader<'a> {
     /// Adds a shape. Returns whether anything was added.
     pub(super) fn add_shape(&mut self, index: ObjectIndex, target: ShapeTarget<'_>) -> bool {
-        let object = self.object(index);
-        if !self.count_shape(object) {
+        let object = self.object_by_index(index);
+        if !self.count_shape_and_check_limit(object) {
             return false;
         }
         if target.depth > MAX_DEPTH {
-            self.error(object.span.clone(), "shapes are nested too deeply", None);
+            self.report_error(object.span.clone(), "shapes are nested too deeply", None);
             return false;
         }
         self.interior_tint = self.interior_tint(object);
         if let Some(subsurface) = self.children_of_kind(object, ObjectKind::Subsurface).next() {
-            let subsurface = self.object(subsurface.target);
+            let subsurface = self.object_by_index(subsurface.target);
             self.refuse(subsurface, "subsurface scattering");
             return false;
         }
@@ -128,11 +128,11 @@ impl<'a> SceneReader<'a> {
         let bsdf: Option<&'a Child> = self.children_of_kind(object, ObjectKind::Bsdf).next();
         if let Some(second) = self.children_of_kind(object, ObjectKind::Bsdf).nth(1) {
             let text = "only the first is used";
-            self.notes.substitute_light("a shape with several BSDFs", text, second.span.clone());
+            self.notes.substitute_changing_lighting("a shape with several BSDFs", text, second.span.clone());
         }
         let emitter = self.children_of_kind(object, ObjectKind::Emitter).next();
         let emitter = emitter.and_then(|child| {
-            let emitter = self.object(child.target);
+            let emitter = self.object_by_index(child.target);
             match emitter.plugin.as_str() {
                 "area" => Some(child.target),
                 "directionalarea" => {
@@ -140,7 +140,11 @@ impl<'a> SceneReader<'a> {
                     None
                 }
                 _ => {
-                    self.error(emitter.span.clone(), "a shape can only contain an `area` emitter", None);
+                    self.report_error(
+                        emitter.span.clone(),
+                        "a shape can only contain an `area` emitter",
+                        None,
+                    );
                     None
                 }
             }
@@ -151,7 +155,7 @@ impl<'a> SceneReader<'a> {
     /// Reports flipped normals, which glimt ignores. In Mitsuba, mirroring transforms flip normals as well.
     fn note_flipped_normals(&mut self, object: &'a PluginInstance) {
         let text = "the front side is not flipped, which matters for one-sided materials, glass and lights";
-        self.notes.substitute_light(
+        self.notes.substitute_changing_lighting(
             "normals flipped by `flip_normals` or a mirroring `to_world`",
             text,
             object.span.clone(),
@@ -179,7 +183,7 @@ impl<'a> SceneReader<'a> {
     ) {
         self.document.set_span_for_next_values(object.span.clone());
         match target.group {
-            Some(group) => self.document.group_list_table(group, list),
+            Some(group) => self.document.start_group_list_table(group, list),
             None => self.document.start_list_table(list),
         }
         if let Some(id) = &object.id {
@@ -198,14 +202,14 @@ impl<'a> SceneReader<'a> {
     fn add_mesh(&mut self, object: &'a PluginInstance, target: ShapeTarget<'_>) -> bool {
         let Some(matrix) = self.shape_transform(object) else { return false };
         let Some((name, span)) = self.text(object, "filename") else {
-            self.error(object.span.clone(), "the mesh needs `filename`", None);
+            self.report_error(object.span.clone(), "the mesh needs `filename`", None);
             return false;
         };
         let is_readable =
             Path::new(name).extension().is_some_and(|ending| ending.eq_ignore_ascii_case(&object.plugin));
         if !is_readable {
             let help = "use the plugin for the file's format: obj, ply, serialized or stl".to_owned();
-            self.error(span, format!("`{0}` reads only .{0} files", object.plugin), Some(help));
+            self.report_error(span, format!("`{0}` reads only .{0} files", object.plugin), Some(help));
             return false;
         }
         // OBJ files are flipped by default, so that v = 0 is at the top like in images.
@@ -301,7 +305,7 @@ impl<'a> SceneReader<'a> {
     /// Whether the material of a shape depends on its texture coordinates or tangents.
     pub(super) fn shape_uses_coordinates(&self, object: &'a PluginInstance) -> bool {
         let children = object.children.iter().map(|child| child.target);
-        self.any_nested(children, |inner| {
+        self.any_nested_object_satisfies(children, |inner| {
             inner.kind == ObjectKind::Texture || inner.properties.iter().any(|one| one.name == "alpha_u")
         })
     }

@@ -7,7 +7,7 @@ pub(super) const MAX_ATTRIBUTES: usize = 200;
 
 /// Returns the name of the first element with more than [`MAX_ATTRIBUTES`] attributes. Malformed text is left
 /// to the parser.
-pub(super) fn overfull_tag(text: &str) -> Option<Range<usize>> {
+pub(super) fn find_overfull_tag(text: &str) -> Option<Range<usize>> {
     let mut position = 0;
     loop {
         let start = position + text[position..].find('<')?;
@@ -17,8 +17,8 @@ pub(super) fn overfull_tag(text: &str) -> Option<Range<usize>> {
         position = match skipped.iter().find(|(open, _)| rest.starts_with(open)) {
             Some((_, close)) => end_of(close)?,
             None => match end_of_tag(rest.as_bytes())? {
-                TagEnd::At(end) => start + end,
-                TagEnd::Overfull => {
+                TagScanOutcome::At(end) => start + end,
+                TagScanOutcome::Overfull => {
                     let name = rest[1..].find(|c: char| c.is_whitespace()).unwrap_or_default();
                     return Some(start + 1..start + 1 + name);
                 }
@@ -28,7 +28,7 @@ pub(super) fn overfull_tag(text: &str) -> Option<Range<usize>> {
 }
 
 /// The end of a tag.
-enum TagEnd {
+enum TagScanOutcome {
     /// Offset after the tag.
     At(usize),
     /// The tag has too many attributes.
@@ -36,16 +36,16 @@ enum TagEnd {
 }
 
 /// Finds the end of a tag, which `>` marks outside of quotes.
-fn end_of_tag(tag: &[u8]) -> Option<TagEnd> {
+fn end_of_tag(tag: &[u8]) -> Option<TagScanOutcome> {
     let (mut position, mut count) = (1, 0);
     loop {
         let at = position + tag[position..].iter().position(|byte| b">\"'".contains(byte))?;
         if tag[at] == b'>' {
-            return Some(TagEnd::At(at + 1));
+            return Some(TagScanOutcome::At(at + 1));
         }
         count += 1;
         if count > MAX_ATTRIBUTES {
-            return Some(TagEnd::Overfull);
+            return Some(TagScanOutcome::Overfull);
         }
         position = at + 2 + tag[at + 1..].iter().position(|byte| *byte == tag[at])?;
     }
@@ -60,15 +60,15 @@ mod tests {
         let attributes = |count: usize| (0..count).map(|index| format!(" a{index}='>'")).collect::<String>();
         let full = format!("<ä{}/>", attributes(MAX_ATTRIBUTES));
         let overfull = format!("<ä{}/>", attributes(MAX_ATTRIBUTES + 1));
-        assert_eq!(overfull_tag(&full.repeat(3)), None);
-        assert_eq!(overfull_tag(&format!("{full}{overfull}")), Some(full.len() + 1..full.len() + 3));
+        assert_eq!(find_overfull_tag(&full.repeat(3)), None);
+        assert_eq!(find_overfull_tag(&format!("{full}{overfull}")), Some(full.len() + 1..full.len() + 3));
         for hidden in
             [format!("<!--{overfull}-->"), format!("<![CDATA[{overfull}]]>"), format!("<?{overfull}?>")]
         {
-            assert_eq!(overfull_tag(&format!("{hidden}<a/>")), None, "{hidden}");
+            assert_eq!(find_overfull_tag(&format!("{hidden}<a/>")), None, "{hidden}");
         }
         for cut in ["", "<", "<a", "<a b='", "<!--", "a>b", "<a b='c'"] {
-            assert_eq!(overfull_tag(cut), None, "{cut}");
+            assert_eq!(find_overfull_tag(cut), None, "{cut}");
         }
     }
 }

@@ -84,7 +84,7 @@ impl UvMap {
 impl<'a> SceneReader<'a> {
     /// Returns the name of a texture, adding it if it is new. Returns `None` if the texture is constant or
     /// missing.
-    pub(super) fn texture(
+    pub(super) fn find_or_add_texture(
         &mut self,
         index: ObjectIndex,
         usage: MitsubaTextureUse,
@@ -93,7 +93,7 @@ impl<'a> SceneReader<'a> {
         self.texture_with_factor(index, usage, uv, 1.0)
     }
 
-    /// Like [`Self::texture`], with the colors multiplied by `factor`.
+    /// Like [`Self::find_or_add_texture`], with the colors multiplied by `factor`.
     pub(super) fn texture_with_factor(
         &mut self,
         index: ObjectIndex,
@@ -101,7 +101,7 @@ impl<'a> SceneReader<'a> {
         uv: UvConvention,
         factor: f64,
     ) -> Option<String> {
-        let object = self.object(index);
+        let object = self.object_by_index(index);
         let (keys, wanted) = match object.plugin.as_str() {
             "bitmap" | "ldrtexture" | "exrtexture" => self.bitmap_keys(object, usage, uv)?,
             "checkerboard" => (self.checkerboard_keys(object, usage, uv)?, "checker".to_owned()),
@@ -117,13 +117,17 @@ impl<'a> SceneReader<'a> {
                     found
                 } else {
                     let text = "replaced by its usual value, gray";
-                    self.notes.substitute_light(&format!("`{}`", object.plugin), text, object.span.clone());
+                    self.notes.substitute_changing_lighting(
+                        &format!("`{}`", object.plugin),
+                        text,
+                        object.span.clone(),
+                    );
                     return None;
                 }
             }
             "gridtexture" | "wireframe" | "curvature" | "volume" => {
                 let text = "replaced by gray";
-                self.notes.substitute_light(
+                self.notes.substitute_changing_lighting(
                     &format!("texture `{}`", object.plugin),
                     text,
                     object.span.clone(),
@@ -151,8 +155,8 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Returns the color of a spectrum that is used in place of a texture.
-    pub(super) fn constant_of_texture(&mut self, index: ObjectIndex, role: ColorRole) -> Option<DVec3> {
-        let object = self.object(index);
+    pub(super) fn color_if_spectrum(&mut self, index: ObjectIndex, role: ColorRole) -> Option<DVec3> {
+        let object = self.object_by_index(index);
         match object.kind {
             ObjectKind::Spectrum => Some(self.spectrum_plugin_color(object, role)),
             ObjectKind::Scene
@@ -174,33 +178,33 @@ impl<'a> SceneReader<'a> {
 
     /// Returns the value of a number key that reads a texture.
     pub(super) fn number_texture(&mut self, index: ObjectIndex, uv: UvConvention) -> Option<BuiltValue> {
-        let name = self.texture(index, MitsubaTextureUse::Number, uv)?;
-        Some(self.channel_value(index, name))
+        let name = self.find_or_add_texture(index, MitsubaTextureUse::Number, uv)?;
+        Some(self.number_texture_value(index, name))
     }
 
     /// Returns the value of `roughness`, which is √α, for a texture of α.
     pub(super) fn roughness_texture(&mut self, index: ObjectIndex, uv: UvConvention) -> Option<BuiltValue> {
-        let object = self.object(index);
+        let object = self.object_by_index(index);
         if object.plugin == "checkerboard" {
             // Convert both values exactly.
             let name = self.checkerboard_of_roots(index, uv)?;
             return Some(BuiltValue::Table(vec![("texture", name.into())]));
         }
         let text = "used as √α instead of α";
-        self.notes.substitute_light("a textured `alpha`", text, object.span.clone());
+        self.notes.substitute_changing_lighting("a textured `alpha`", text, object.span.clone());
         self.number_texture(index, uv)
     }
 
     /// Returns the value of `bump`.
     pub(super) fn height_texture(&mut self, index: ObjectIndex, uv: UvConvention) -> Option<BuiltValue> {
-        let name = self.texture(index, MitsubaTextureUse::Number, uv)?;
+        let name = self.find_or_add_texture(index, MitsubaTextureUse::Number, uv)?;
         Some(name.into())
     }
 
     /// Returns the value of a number key that reads the texture `name`. Selects the red channel if the image
     /// may have alpha, which `opacity` reads by default.
-    fn channel_value(&mut self, index: ObjectIndex, name: String) -> BuiltValue {
-        let object = self.object(index);
+    fn number_texture_value(&mut self, index: ObjectIndex, name: String) -> BuiltValue {
+        let object = self.object_by_index(index);
         let has_alpha = self.image_may_have_alpha(object);
         let mut entries = vec![("texture", name.into())];
         if has_alpha {
@@ -232,22 +236,23 @@ impl<'a> SceneReader<'a> {
         uv: UvConvention,
     ) -> Option<(TableEntries, String)> {
         let Some((name, span)) = self.text(object, "filename") else {
-            self.error(object.span.clone(), "the texture needs `filename`", None);
+            self.report_error(object.span.clone(), "the texture needs `filename`", None);
             return None;
         };
         let kind = extension(name);
         if !IMAGES.contains(&kind.as_str()) {
             let help = format!("convert it to one of {}", IMAGES[..12].join(", "));
-            self.error(span, format!("glimt cannot read .{} images", shorten(&kind)), Some(help));
+            self.report_error(span, format!("glimt cannot read .{} images", shorten(&kind)), Some(help));
             return None;
         }
-        let mut keys: TableEntries = vec![("file", self.asset(name, &span, "image")?.into())];
+        let mut keys: TableEntries =
+            vec![("file", self.resolve_asset_reference(name, &span, "image")?.into())];
         match self.text(object, "filter_type") {
             None | Some(("bilinear" | "trilinear" | "ewa", _)) => {}
             Some(("nearest", _)) => keys.push(("filter", "nearest".into())),
             Some((other, span)) => {
                 let help = "expected bilinear or nearest".to_owned();
-                self.error(span, format!("unknown filter `{}`", shorten(other)), Some(help));
+                self.report_error(span, format!("unknown filter `{}`", shorten(other)), Some(help));
             }
         }
         let wrap = self.text(object, "wrap_mode").or_else(|| self.text(object, "wrap_mode_u"));
@@ -257,7 +262,7 @@ impl<'a> SceneReader<'a> {
             Some(("clamp", _)) => keys.push(("wrap", "clamp".into())),
             Some((other, span)) => {
                 let help = "expected repeat, mirror or clamp".to_owned();
-                self.error(span, format!("unknown wrap mode `{}`", shorten(other)), Some(help));
+                self.report_error(span, format!("unknown wrap mode `{}`", shorten(other)), Some(help));
             }
         }
         for name in ["wrap_mode_v", "max_anisotropy", "cache", "format"] {
@@ -271,14 +276,22 @@ impl<'a> SceneReader<'a> {
             keys.push(("encoding", if is_linear { "linear" } else { "srgb" }.into()));
         } else if usage == MitsubaTextureUse::Normal && !is_raw && !is_float {
             let text = "read as linear; Mitsuba decodes it from sRGB";
-            self.notes.substitute_light("a normal map that is not `raw`", text, object.span.clone());
+            self.notes.substitute_changing_lighting(
+                "a normal map that is not `raw`",
+                text,
+                object.span.clone(),
+            );
         }
         if let Some(gamma) = gamma
             && gamma != 1.0
             && (gamma - 2.2).abs() > 0.01
             && gamma > 0.0
         {
-            self.notes.substitute_light("`gamma` of a bitmap", "replaced by sRGB", span_of(object, "gamma"));
+            self.notes.substitute_changing_lighting(
+                "`gamma` of a bitmap",
+                "replaced by sRGB",
+                span_of(object, "gamma"),
+            );
         }
         keys.extend(self.uv_keys(object, uv, true));
         let stem = name.rsplit(['/', '\\']).next().unwrap_or_default();
@@ -292,7 +305,11 @@ impl<'a> SceneReader<'a> {
         let keys = UvMap::new(&to_uv, uv, is_image).keys();
         keys.unwrap_or_else(|| {
             let text = "ignored";
-            self.notes.substitute_light("`to_uv` that shears the texture", text, span_of(object, "to_uv"));
+            self.notes.substitute_changing_lighting(
+                "`to_uv` that shears the texture",
+                text,
+                span_of(object, "to_uv"),
+            );
             UvMap::new(&DMat4::IDENTITY, uv, is_image).keys().unwrap_or_default()
         })
     }
@@ -303,7 +320,7 @@ impl<'a> SceneReader<'a> {
             |name: &str, default: f64| match self.color(object, name, ColorRole::Reflectance, default) {
                 ColorSource::Constant(color) => color,
                 ColorSource::Texture(_) => {
-                    self.notes.substitute_light(
+                    self.notes.substitute_changing_lighting(
                         "a texture in a checkerboard",
                         "replaced by gray",
                         object.span.clone(),
@@ -326,7 +343,7 @@ impl<'a> SceneReader<'a> {
             // Mitsuba swaps the colors when it evaluates a checkerboard as a number.
             MitsubaTextureUse::Number => colors.reverse(),
             MitsubaTextureUse::Normal => {
-                self.error(object.span.clone(), "a checkerboard cannot be a normal map", None);
+                self.report_error(object.span.clone(), "a checkerboard cannot be a normal map", None);
                 return None;
             }
         }
@@ -373,7 +390,7 @@ impl<'a> SceneReader<'a> {
 
     /// Adds a checkerboard of α as a texture of √α.
     fn checkerboard_of_roots(&mut self, index: ObjectIndex, uv: UvConvention) -> Option<String> {
-        let object = self.object(index);
+        let object = self.object_by_index(index);
         let [first, second] = self.checker_colors(object);
         let root = |color: DVec3| DVec3::splat(libm::sqrt(luminance(color).clamp(1e-4, 1.0)));
         let keys = self.checker_keys(object, [root(second), root(first)], uv);

@@ -7,7 +7,7 @@ use super::xml::shorten;
 impl<'a> SceneReader<'a> {
     /// Notes nested objects of an object that no function has read.
     pub(super) fn report_unused_children(&mut self, index: ObjectIndex) {
-        let object = self.object(index);
+        let object = self.object_by_index(index);
         if self.reported_children.insert(index) {
             object.children.iter().filter(|child| !child.is_used.get()).for_each(|child| {
                 self.report_unused_child(object, child);
@@ -16,7 +16,7 @@ impl<'a> SceneReader<'a> {
     }
 
     fn report_unused_child(&mut self, object: &'a PluginInstance, child: &'a Child) {
-        let inner = self.object(child.target);
+        let inner = self.object_by_index(child.target);
         let parent = shorten(&object.plugin);
         let subject = match &child.name {
             Some(name) => format!("`{}` of `{parent}`", shorten(name)),
@@ -27,7 +27,7 @@ impl<'a> SceneReader<'a> {
 
     /// Notes a nested object of the scene that is not converted and cannot be referred to.
     pub(super) fn report_unreachable_child(&mut self, scene: &'a PluginInstance, child: &'a Child) {
-        let inner = self.object(child.target);
+        let inner = self.object_by_index(child.target);
         // Without a name, only the scene itself could use the object.
         let is_definition =
             inner.id.is_some() && !matches!(inner.kind, ObjectKind::Integrator | ObjectKind::Scene);
@@ -38,14 +38,13 @@ impl<'a> SceneReader<'a> {
 
     /// Notes unused properties and nested objects of the sensor, the integrator, and the objects in them.
     pub(super) fn report_unused_settings(&mut self, scene: &'a PluginInstance, sensor: ObjectIndex) {
-        let integrators = scene
-            .children
-            .iter()
-            .filter(|child| child.is_used.get() && self.object(child.target).kind == ObjectKind::Integrator);
+        let integrators = scene.children.iter().filter(|child| {
+            child.is_used.get() && self.object_by_index(child.target).kind == ObjectKind::Integrator
+        });
         let mut pending: Vec<ObjectIndex> = integrators.map(|child| child.target).collect();
         pending.push(sensor);
         while let Some(index) = pending.pop() {
-            let object = self.object(index);
+            let object = self.object_by_index(index);
             let known: &[&str] = match object.kind {
                 ObjectKind::Sampler => &["seed", "jitter", "scramble", "dimension"],
                 ObjectKind::Filter => &["radius", "b", "c", "stddev", "lobes"],
@@ -73,7 +72,7 @@ impl<'a> SceneReader<'a> {
             self.report_unused(index);
             self.report_unused_children(index);
             let is_setting = |child: &&Child| {
-                let kind = self.object(child.target).kind;
+                let kind = self.object_by_index(child.target).kind;
                 child.is_used.get() && kind != ObjectKind::Medium && kind != ObjectKind::Spectrum
             };
             pending.extend(object.children.iter().filter(is_setting).map(|child| child.target));

@@ -154,7 +154,7 @@ const STEPS: [&str; 5] = ["translate", "rotate", "scale", "lookat", "matrix"];
 pub(super) fn parse_transform(element: &Element) -> Result<TransformValue, ValueError> {
     let mut transform = TransformValue { matrix: DMat4::IDENTITY, target: None };
     for step in &element.children {
-        let (matrix, target) = parse_step(step)?;
+        let (matrix, target) = parse_transform_step(step)?;
         transform.matrix = matrix * transform.matrix;
         transform.target = match (target, transform.target) {
             (Some(target), _) => Some(target),
@@ -181,7 +181,7 @@ pub(super) fn check_attributes(element: &Element, known: &[&str]) -> Result<(), 
     Err(ValueError { help: Some(help), ..ValueError::new(&unknown.span, message) })
 }
 
-fn parse_step(step: &Element) -> Result<(DMat4, Option<DVec3>), ValueError> {
+fn parse_transform_step(step: &Element) -> Result<(DMat4, Option<DVec3>), ValueError> {
     let known: &[&str] = match step.tag.to_ascii_lowercase().as_str() {
         "rotate" => &["x", "y", "z", "angle", "value"],
         "lookat" => &["origin", "target", "up"],
@@ -264,7 +264,7 @@ fn parse_matrix(attribute: &Attribute) -> Result<DMat4, ValueError> {
 }
 
 /// Returns a property's name, converted from camel case if it is from a version below 2.
-pub(super) fn property_name(name: &str, is_old: bool) -> String {
+pub(super) fn to_snake_case_if_old(name: &str, is_old: bool) -> String {
     if !is_old {
         return name.to_owned();
     }
@@ -343,7 +343,7 @@ mod tests {
             ("sigmaA", "sigma_a"),
         ] {
             assert_eq!(
-                (property_name(old, true), property_name(old, false)),
+                (to_snake_case_if_old(old, true), to_snake_case_if_old(old, false)),
                 (new.to_owned(), old.to_owned())
             );
         }

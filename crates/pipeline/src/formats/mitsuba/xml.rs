@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use roxmltree::{Document, Node, ParsingOptions, TextPos};
 
-use super::tags::{MAX_ATTRIBUTES, overfull_tag};
+use super::tags::{MAX_ATTRIBUTES, find_overfull_tag};
 use crate::assets::AssetError;
 use crate::control::CancelToken;
 use crate::formats::foreign::sources::SourceReader;
@@ -90,7 +90,12 @@ impl<'a> XmlLoader<'a> {
     }
 
     /// Reports an error, unless there are `MAX_ERRORS` already.
-    pub(super) fn error(&mut self, span: Range<usize>, message: impl Into<String>, help: Option<String>) {
+    pub(super) fn report_error(
+        &mut self,
+        span: Range<usize>,
+        message: impl Into<String>,
+        help: Option<String>,
+    ) {
         if self.errors.len() < MAX_ERRORS {
             self.errors.push(self.reader.files.diagnostic(Severity::Error, span, message, "", help));
         }
@@ -102,7 +107,7 @@ impl<'a> XmlLoader<'a> {
         if root.tag != "scene" {
             let message = format!("the root element is <{}>, not <scene>", shorten(&root.tag));
             let help = "this file is part of a scene; open the file that includes it".to_owned();
-            self.error(root.span.clone(), message, Some(help));
+            self.report_error(root.span.clone(), message, Some(help));
             return Ok(None);
         }
         self.parameters.sort_by_key(|(name, _)| std::cmp::Reverse(name.len()));
@@ -113,9 +118,9 @@ impl<'a> XmlLoader<'a> {
 
     fn load_file(&mut self, path: &Path) -> Result<Option<Element>, AssetError> {
         let (text, start) = self.reader.read(path, self.token)?;
-        if let Some(span) = overfull_tag(&text) {
+        if let Some(span) = find_overfull_tag(&text) {
             let message = format!("the element has more than {MAX_ATTRIBUTES} attributes");
-            self.error(start + span.start..start + span.end, message, None);
+            self.report_error(start + span.start..start + span.end, message, None);
             return Ok(None);
         }
         let options = ParsingOptions { nodes_limit: MAX_NODES, ..ParsingOptions::default() };
@@ -130,9 +135,9 @@ impl<'a> XmlLoader<'a> {
         let root = document.root_element();
         let is_old = root.attribute("version").is_some_and(is_old_version);
         if root.tag_name().name() == "scene" && root.attribute("version").is_none() {
-            let span = tag_span(&text, &root, start);
+            let span = element_name_span(&text, &root, start);
             let help = "add the version that the scene was written for, such as version=\"3.0.0\"".to_owned();
-            self.error(span, "the version is missing", Some(help));
+            self.report_error(span, "the version is missing", Some(help));
         }
         self.open.push(path.to_owned());
         let source = FileSource { text: &text, start, is_old, path };
@@ -161,10 +166,10 @@ impl<'a> XmlLoader<'a> {
             | roxmltree::Error::NoRootNode
             | roxmltree::Error::UnexpectedEndOfStream => text.trim_end().len(),
             roxmltree::Error::DtdDetected => text.find("<!DOCTYPE").unwrap_or_default(),
-            other => offset_of(text, other.pos()),
+            other => byte_offset_at_position(text, other.pos()),
         };
         let next = text[offset..].chars().next().map_or(0, char::len_utf8);
-        self.error(start + offset..start + offset + next, shorten(&message), Some(help.to_owned()));
+        self.report_error(start + offset..start + offset + next, shorten(&message), Some(help.to_owned()));
     }
 
     /// Converts a node and its children, and replaces includes with the included elements.
@@ -175,10 +180,14 @@ impl<'a> XmlLoader<'a> {
         depth: usize,
     ) -> Result<Option<Element>, AssetError> {
         self.token.check_pause_and_cancel()?;
-        let span = tag_span(source.text, node, source.start);
+        let span = element_name_span(source.text, node, source.start);
         if depth > MAX_DEPTH {
             let help = "flatten the scene".to_owned();
-            self.error(span, format!("elements are nested more than {MAX_DEPTH} levels deep"), Some(help));
+            self.report_error(
+                span,
+                format!("elements are nested more than {MAX_DEPTH} levels deep"),
+                Some(help),
+            );
             return Ok(None);
         }
         let mut attributes = Vec::new();
@@ -187,7 +196,11 @@ impl<'a> XmlLoader<'a> {
             let span = source.start + local.start..source.start + local.end.max(local.start);
             if attribute.value().len() > MAX_ATTRIBUTE_BYTES {
                 let message = format!("the attribute is longer than {} MiB", MAX_ATTRIBUTE_BYTES >> 20);
-                self.error(span.start..span.start, message, Some("store the data in a file".to_owned()));
+                self.report_error(
+                    span.start..span.start,
+                    message,
+                    Some("store the data in a file".to_owned()),
+                );
                 return Ok(None);
             }
             let (name, value) = (attribute.name().to_owned(), attribute.value().to_owned());
@@ -230,13 +243,13 @@ impl<'a> XmlLoader<'a> {
         let length = line.char_indices().nth(40).map_or(line.len(), |(at, _)| at);
         let span = source.start + start..source.start + start + length;
         let help = "remove it, or make it a comment: <!-- … -->".to_owned();
-        self.error(span, format!("unexpected text `{}`", shorten(line)), Some(help));
+        self.report_error(span, format!("unexpected text `{}`", shorten(line)), Some(help));
     }
 
     fn add_default(&mut self, default: &Element) {
         let (Some(name), Some(value)) = (default.value("name"), default.attribute("value")) else {
             let help = "write <default name=\"…\" value=\"…\"/>".to_owned();
-            return self.error(default.span.clone(), "<default> needs `name` and `value`", Some(help));
+            return self.report_error(default.span.clone(), "<default> needs `name` and `value`", Some(help));
         };
         if self.parameters.iter().any(|(known, _)| known == name) {
             return;
@@ -245,14 +258,14 @@ impl<'a> XmlLoader<'a> {
         let value = substitute(&value.value, &self.parameters);
         if value.len() > MAX_SUBSTITUTED_BYTES || name.is_empty() {
             let message = if name.is_empty() { "the name is empty" } else { "the value is too long" };
-            return self.error(default.span.clone(), message, None);
+            return self.report_error(default.span.clone(), message, None);
         }
         self.parameters.push((name, value));
     }
 
     fn add_folder(&mut self, path: &Element, file: &Path) {
         let Some(value) = path.attribute("value") else {
-            return self.error(path.span.clone(), "<path> needs `value`", None);
+            return self.report_error(path.span.clone(), "<path> needs `value`", None);
         };
         let folder = substitute(&value.value, &self.parameters).replace('\\', "/");
         let span = value.span.clone();
@@ -263,7 +276,7 @@ impl<'a> XmlLoader<'a> {
             Some(folder) => self.folders.push(folder.clone()),
             None => {
                 candidates.into_iter().for_each(|folder| self.reader.watch_missing(folder));
-                self.error(span, format!("folder not found: {}", shorten(&folder)), None);
+                self.report_error(span, format!("folder not found: {}", shorten(&folder)), None);
             }
         }
     }
@@ -275,7 +288,7 @@ impl<'a> XmlLoader<'a> {
         children: &mut Vec<Element>,
     ) -> Result<(), AssetError> {
         let Some(name) = include.attributes.iter_mut().find(|one| one.name == "filename") else {
-            self.error(include.span, "<include> needs `filename`", None);
+            self.report_error(include.span, "<include> needs `filename`", None);
             return Ok(());
         };
         // Files written on Windows have backslashes.
@@ -294,23 +307,23 @@ impl<'a> XmlLoader<'a> {
         }
         let Some(found) = found else {
             let help = "files are searched next to this file, then in the folders of <path>".to_owned();
-            self.error(span, format!("included file not found: {}", shorten(&name)), Some(help));
+            self.report_error(span, format!("included file not found: {}", shorten(&name)), Some(help));
             return Ok(());
         };
         let is_same = |open: &PathBuf| same_file(open, &found);
         if self.open.iter().any(is_same) {
-            self.error(span, "the file includes itself", Some("remove this include".to_owned()));
+            self.report_error(span, "the file includes itself", Some("remove this include".to_owned()));
             return Ok(());
         }
         if self.open.len() > MAX_INCLUDE_DEPTH {
             let message = format!("includes are nested more than {MAX_INCLUDE_DEPTH} levels deep");
-            self.error(span, message, None);
+            self.report_error(span, message, None);
             return Ok(());
         }
         let root = match self.load_file(&found) {
             Ok(root) => root,
             Err(error @ (AssetError::Unreadable { .. } | AssetError::Malformed { .. })) => {
-                self.error(span, format!("cannot include this file: {error}"), None);
+                self.report_error(span, format!("cannot include this file: {error}"), None);
                 return Ok(());
             }
             Err(error) => return Err(error),
@@ -418,7 +431,7 @@ fn is_old_version(version: &str) -> bool {
 }
 
 /// Span of the element's name in its start tag.
-fn tag_span(text: &str, node: &Node<'_, '_>, start: usize) -> Range<usize> {
+fn element_name_span(text: &str, node: &Node<'_, '_>, start: usize) -> Range<usize> {
     let range = node.range();
     let after = (range.start + 1).min(range.end);
     let name = text.get(after..range.end).unwrap_or_default();
@@ -427,7 +440,7 @@ fn tag_span(text: &str, node: &Node<'_, '_>, start: usize) -> Range<usize> {
 }
 
 /// Byte offset of a position. Rows and columns start at 1, and columns count characters.
-fn offset_of(text: &str, position: TextPos) -> usize {
+fn byte_offset_at_position(text: &str, position: TextPos) -> usize {
     let mut start = 0;
     for _ in 1..position.row {
         match text[start..].find('\n') {
@@ -480,6 +493,6 @@ mod tests {
 
     #[test]
     fn positions_count_characters() {
-        assert_eq!(offset_of("ä<\nö<b", TextPos::new(2, 2)), "ä<\nö".len());
+        assert_eq!(byte_offset_at_position("ä<\nö<b", TextPos::new(2, 2)), "ä<\nö".len());
     }
 }

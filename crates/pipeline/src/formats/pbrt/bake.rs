@@ -25,10 +25,10 @@ const MAX_TEXELS: f64 = 8e6;
 const CELL_TEXELS: f64 = 64.0;
 
 /// Identity of a decoded image: its file, `is_linear` and `is_number`.
-type ImageKey = (String, bool, bool);
+type DecodedImageKey = (String, bool, bool);
 
 /// Decoded images by identity.
-type Images = HashMap<ImageKey, Pixels>;
+type Images = HashMap<DecodedImageKey, Pixels>;
 
 /// The part of the (u, v) plane that a baked image covers.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,7 +63,7 @@ impl PbrtConverter<'_> {
         let path = self.asset_path(&image.file.text);
         let stamp = FileStamp::from_path(&path);
         self.companions.push(Companion { path: path.clone(), hash: None, stamp });
-        memo::is_gray(&path, stamp, || {
+        memo::is_image_gray_memoized(&path, stamp, || {
             let Ok(texels) = self.decode(image, ColorEncoding::CutOut(ColorTransferFunction::Srgb)) else {
                 return true;
             };
@@ -79,9 +79,13 @@ impl PbrtConverter<'_> {
     }
 
     /// Bakes a texture. Returns the keys of its table and a name for it.
-    pub(super) fn baked_keys(&mut self, node: &TextureNode, usage: PbrtTextureUse) -> (TableEntries, String) {
+    pub(super) fn bake_texture(
+        &mut self,
+        node: &TextureNode,
+        usage: PbrtTextureUse,
+    ) -> (TableEntries, String) {
         let mut leaves = Vec::new();
-        collect_leaves(node, &mut leaves);
+        collect_uv_dependent_nodes(node, &mut leaves);
         let first_file = leaves.iter().find_map(|leaf| leaf.as_image()).map(|image| &image.file);
         let mut images = Images::new();
         for leaf in &leaves {
@@ -100,7 +104,7 @@ impl PbrtConverter<'_> {
         }
         let is_number = usage != PbrtTextureUse::Color;
         let pixels = bake(node, &images, &domain, usage, self.token);
-        let name = first_file.map_or_else(|| "texture".to_owned(), |file| stem(&file.text));
+        let name = first_file.map_or_else(|| "texture".to_owned(), |file| file_stem(&file.text));
         let file = self.add_generated_file(&name, "pfm", pixels.encode_pfm(is_number));
         let mut keys: TableEntries = vec![("file", file.into())];
         if domain.wrap == ImageWrap::Clamp {
@@ -148,7 +152,7 @@ impl PbrtConverter<'_> {
     }
 }
 
-fn stem(file: &str) -> String {
+fn file_stem(file: &str) -> String {
     std::path::Path::new(file).file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }
 
@@ -156,12 +160,12 @@ fn has_transparency(texels: &Texels) -> bool {
     texels.has_alpha() && (0..texels.len()).any(|index| texels.premultiplied_texel(index).w < 1.0)
 }
 
-fn image_key(image: &ImageNode) -> ImageKey {
+fn image_key(image: &ImageNode) -> DecodedImageKey {
     (image.file.text.clone(), image.is_linear, image.is_number)
 }
 
 /// Collects the nodes that depend directly on (u, v).
-fn collect_leaves<'a>(node: &'a TextureNode, leaves: &mut Vec<&'a TextureNode>) {
+fn collect_uv_dependent_nodes<'a>(node: &'a TextureNode, leaves: &mut Vec<&'a TextureNode>) {
     match node {
         TextureNode::Image(_) | TextureNode::Checker(..) | TextureNode::Bilinear(..) => leaves.push(node),
         TextureNode::Constant(_)
@@ -170,11 +174,11 @@ fn collect_leaves<'a>(node: &'a TextureNode, leaves: &mut Vec<&'a TextureNode>) 
         | TextureNode::Mix(_)
         | TextureNode::Power(..) => {}
     }
-    node.parts().iter().for_each(|part| collect_leaves(part, leaves));
+    node.parts().iter().for_each(|part| collect_uv_dependent_nodes(part, leaves));
 }
 
 /// Returns the mapping of a leaf, its period in mapped units, and its number of texels per mapped unit.
-fn leaf_grid(leaf: &TextureNode, images: &Images) -> (UvMapping, f64, DVec2) {
+fn leaf_mapping_and_resolution(leaf: &TextureNode, images: &Images) -> (UvMapping, f64, DVec2) {
     match leaf {
         TextureNode::Image(image) => {
             let size = images.get(&image_key(image));
@@ -193,7 +197,7 @@ fn leaf_grid(leaf: &TextureNode, images: &Images) -> (UvMapping, f64, DVec2) {
 
 /// Chooses the domain of a baked image. Also returns whether the image repeats exactly as the texture does.
 fn domain_of(leaves: &[&TextureNode], images: &Images) -> (Domain, bool) {
-    let grids: Vec<_> = leaves.iter().map(|leaf| leaf_grid(leaf, images)).collect();
+    let grids: Vec<_> = leaves.iter().map(|leaf| leaf_mapping_and_resolution(leaf, images)).collect();
     let first = grids.first().map_or(UvMapping::IDENTITY, |grid| grid.0);
     let has_same_mapping = grids.iter().all(|grid| grid.0 == first) && first.scale.abs().min_element() > 0.0;
     let period = grids.iter().map(|grid| grid.1).fold(1.0, f64::max);
@@ -267,7 +271,7 @@ fn evaluate(node: &TextureNode, images: &Images, uv: DVec2) -> DVec3 {
     let of = |part: &TextureNode| evaluate(part, images, uv);
     match node {
         TextureNode::Constant(value) => *value,
-        TextureNode::Image(image) => evaluate_image(image, images, uv),
+        TextureNode::Image(image) => image_color_at_uv(image, images, uv),
         TextureNode::Checker(mapping, parts) => {
             let cell = (uv * mapping.scale + mapping.offset).floor();
             of(&parts[usize::from((cell.x + cell.y).rem_euclid(2.0) == 1.0)])
@@ -287,7 +291,7 @@ fn evaluate(node: &TextureNode, images: &Images, uv: DVec2) -> DVec3 {
     }
 }
 
-fn evaluate_image(image: &ImageNode, images: &Images, uv: DVec2) -> DVec3 {
+fn image_color_at_uv(image: &ImageNode, images: &Images, uv: DVec2) -> DVec3 {
     let Some(pixels) = images.get(&image_key(image)) else { return DVec3::ZERO };
     let at = uv * image.mapping.scale + image.mapping.offset;
     let place = DVec2::new(at.x * pixels.width as f64, (1.0 - at.y) * pixels.height as f64);
@@ -335,7 +339,7 @@ mod tests {
 
     fn baked(node: &TextureNode) -> (Pixels, Domain, bool) {
         let mut leaves = Vec::new();
-        collect_leaves(node, &mut leaves);
+        collect_uv_dependent_nodes(node, &mut leaves);
         let (domain, is_exact) = domain_of(&leaves, &images());
         let pixels = bake(node, &images(), &domain, PbrtTextureUse::Number, &CancelToken::new());
         (pixels, domain, is_exact)

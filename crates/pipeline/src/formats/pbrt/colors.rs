@@ -88,11 +88,11 @@ impl<'a> ColorReader<'a> {
         usage: SpectrumUse,
     ) -> PbrtResult<Option<DVec3>> {
         let Some(found) = parameters.find(name) else { return Ok(None) };
-        self.color_of(found, space, usage).map(Some)
+        self.color_from_parameter(found, space, usage).map(Some)
     }
 
     /// Converts the values of a parameter to a color.
-    pub(super) fn color_of(
+    pub(super) fn color_from_parameter(
         &self,
         found: &Parameter,
         space: ColorSpace,
@@ -116,7 +116,7 @@ impl<'a> ColorReader<'a> {
                 if !(100.0..=1e6).contains(&kelvin) {
                     return Err(PbrtError::new(span(), "a temperature must be between 100 and 1000000 K"));
                 }
-                Ok(color_of_unit_luminance(|wavelength| blackbody_radiance(wavelength, kelvin)))
+                Ok(unit_luminance_spectrum_color(|wavelength| blackbody_radiance(wavelength, kelvin)))
             }
             ParameterType::Spectrum => self.spectrum_color(found, usage),
             ParameterType::Float => Ok(DVec3::splat(*found.single(found.numbers()?)?)),
@@ -154,7 +154,7 @@ impl<'a> ColorReader<'a> {
                 if let Some(color) = named_color(&name.text, usage) {
                     return Ok(color);
                 }
-                self.spectrum_file(name)?
+                self.read_spectrum_file(name)?
             }
             Values::Flags(_) => {
                 return Err(PbrtError::new(
@@ -166,12 +166,12 @@ impl<'a> ColorReader<'a> {
         Ok(match usage {
             SpectrumUse::Reflectance => reflectance_color(&spectrum),
             SpectrumUse::Unbounded => unbounded_color(&spectrum),
-            SpectrumUse::Emission => color_of_unit_luminance(|wavelength| spectrum.at(wavelength)),
+            SpectrumUse::Emission => unit_luminance_spectrum_color(|wavelength| spectrum.at(wavelength)),
         })
     }
 
     /// Reads an `.spd` file.
-    fn spectrum_file(&self, name: &Text) -> PbrtResult<SampledSpectrum> {
+    fn read_spectrum_file(&self, name: &Text) -> PbrtResult<SampledSpectrum> {
         /// Maximum size of a spectrum file.
         const MAX_BYTES: u64 = 16 << 20;
         let path = self.folder.join(&name.text);
@@ -183,7 +183,7 @@ impl<'a> ColorReader<'a> {
         let (hash, stamp) = read.as_ref().map_or((None, None), |file| (Some(file.hash), file.stamp));
         self.companions.borrow_mut().push(Companion { path: path.clone(), hash, stamp });
         let file = read.map_err(|error| PbrtError::new(span.clone(), error.to_string()))?;
-        SampledSpectrum::from_spd(&file.text).map_err(|(line, reason)| {
+        SampledSpectrum::parse_spd(&file.text).map_err(|(line, reason)| {
             PbrtError::new(span, format!("{}, line {line}: {reason}", path.display()))
         })
     }
@@ -205,13 +205,13 @@ impl<'a> ColorReader<'a> {
         {
             return Ok((*ior, true));
         }
-        let color = self.color_of(found, ColorSpace::Srgb, SpectrumUse::Unbounded)?;
+        let color = self.color_from_parameter(found, ColorSpace::Srgb, SpectrumUse::Unbounded)?;
         Ok((color.element_sum() / 3.0, color.max_element() - color.min_element() > 1e-3 * color.y))
     }
 }
 
 /// Returns the color of a spectrum, scaled to unit luminance, or black for a spectrum without luminance.
-fn color_of_unit_luminance(spectrum: impl Fn(f64) -> f64) -> DVec3 {
+fn unit_luminance_spectrum_color(spectrum: impl Fn(f64) -> f64) -> DVec3 {
     let xyz = spectrum_to_xyz(spectrum);
     if xyz.y > 0.0 { xyz_to_linear_rgb(xyz / xyz.y).max(DVec3::ZERO) } else { DVec3::ZERO }
 }

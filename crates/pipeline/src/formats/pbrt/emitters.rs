@@ -7,7 +7,7 @@ use super::parameters::Parameters;
 use super::scene::PbrtConverter;
 use super::shapes::round_shape_area;
 use super::state::{Entity, ShapeEntity};
-use super::texture_nodes::{ImageFilter, ImageNode, ImageWrap, TextureNode, TextureValue, UvMapping};
+use super::texture_nodes::{ImageFilter, ImageNode, ImageWrap, TextureNode, TextureValueKind, UvMapping};
 use crate::formats::foreign::meshes::MeshData;
 use crate::math::{DMat4, DVec3};
 use crate::scene::nearest::nearest_name;
@@ -39,20 +39,20 @@ impl PbrtConverter<'_> {
                 self.notes.note("area lights in objects", "they do not emit light, as in pbrt", light.span());
                 None
             }
-            Some(light) => self.read_area_light(light, entity, data, matrix)?,
+            Some(light) => self.read_shape_emission(light, entity, data, matrix)?,
             None => None,
         };
         let (parameters, space) = (&entity.parameters, entity.color_space);
         let notes = &mut self.notes;
-        let alpha = self.resolver.parameter(parameters, "alpha", TextureValue::Number, space, notes)?;
+        let alpha = self.resolver.parameter(parameters, "alpha", TextureValueKind::Number, space, notes)?;
         let alpha = alpha.filter(|alpha| alpha.as_constant().is_none_or(|alpha| alpha.x < 1.0));
         let is_hidden = alpha.as_ref().and_then(TextureNode::as_constant).is_some_and(|alpha| alpha.x <= 0.0);
-        let tint = self.read_inside_medium(shape)?;
+        let tint = self.read_inside_transmittance(shape)?;
         match (is_hidden, emission) {
             (true, None) => Ok(None),
             (true, emission) => {
                 let text = "it is visible";
-                self.notes.substitute_light("a light hidden by `alpha`", text, entity.span());
+                self.notes.substitute_changing_lighting("a light hidden by `alpha`", text, entity.span());
                 Ok(Some(ShapeProperties { emission, alpha: None, tint }))
             }
             (false, emission) => Ok(Some(ShapeProperties { emission, alpha, tint })),
@@ -60,7 +60,7 @@ impl PbrtConverter<'_> {
     }
 
     /// Returns the emission of a shape, or `None` if it is black.
-    fn read_area_light(
+    fn read_shape_emission(
         &mut self,
         light: &Entity,
         shape: &Entity,
@@ -97,7 +97,7 @@ impl PbrtConverter<'_> {
                 let error = PbrtError::new(span, "`filename` cannot be combined with `L`");
                 return Err(error.with_help("remove one of them"));
             }
-            Some(file) if self.is_tolerated_missing(file, "image of a light", "the light is white") => None,
+            Some(file) if self.tolerate_if_missing(file, "image of a light", "the light is white") => None,
             Some(file) => Some(ImageNode {
                 file: file.clone(),
                 mapping: UvMapping::IDENTITY,
@@ -135,19 +135,19 @@ impl PbrtConverter<'_> {
             (kind, None) => return positive_area(round_shape_area(kind, parameters)?, parameters),
         };
         let areas: Vec<f64> =
-            data.triangles.iter().map(|triangle| data.transformed_area(*triangle, matrix)).collect();
+            data.triangles.iter().map(|triangle| data.transformed_triangle_area(*triangle, matrix)).collect();
         let mean = areas.iter().sum::<f64>() / areas.len().max(1) as f64;
         let is_equal = areas.iter().all(|area| (area / mean - 1.0).abs() < 0.01);
         if !is_equal {
             let text = "every triangle has the same radiance instead of the same power";
-            self.notes.substitute_light("`power` of a mesh", text, span);
+            self.notes.substitute_changing_lighting("`power` of a mesh", text, span);
         }
         positive_area(mean, parameters)
     }
 
     /// Returns the transmittance per unit length of the medium inside a shape, if the medium only absorbs
     /// light. Adds substitutions for other media.
-    fn read_inside_medium(&mut self, shape: &ShapeEntity) -> PbrtResult<Option<DVec3>> {
+    fn read_inside_transmittance(&mut self, shape: &ShapeEntity) -> PbrtResult<Option<DVec3>> {
         let [inside, outside] = &shape.media;
         let span = shape.placed.entity.span();
         let mut tint = None;
@@ -169,7 +169,11 @@ impl PbrtConverter<'_> {
                 None => {
                     let kind = medium.parameters.string("type")?.map_or("", |kind| &kind.text);
                     let subject = format!("medium `{kind}`");
-                    self.notes.substitute_light(&subject, "light passes through it unchanged", medium.span());
+                    self.notes.substitute_changing_lighting(
+                        &subject,
+                        "light passes through it unchanged",
+                        medium.span(),
+                    );
                 }
             }
         }

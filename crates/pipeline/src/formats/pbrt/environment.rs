@@ -78,7 +78,9 @@ impl PbrtConverter<'_> {
         }
         let rows = maps.iter().map(|map| map.pixels.height).max().unwrap_or(ROWS[0]);
         let rows = rows.clamp(ROWS[0], ROWS[1]);
-        let bytes = memo::environment(key, || resample(&maps, lights.color, rows).encode_pfm(false));
+        let bytes = memo::environment(key, || {
+            combine_as_equirectangular(&maps, lights.color, rows).encode_pfm(false)
+        });
         let span = lights.images[0].file.span.clone();
         let name = self.add_generated_file("environment", "pfm", bytes);
         self.document.set_span_for_next_values(span);
@@ -141,7 +143,7 @@ impl Map {
 
 /// Statistics of the samples in a texel.
 #[derive(Clone, Copy)]
-struct TexelSamples {
+struct TexelSampleStats {
     mean: Vec3,
     /// Smallest and largest sample, measured by the largest color component.
     least: f32,
@@ -149,28 +151,28 @@ struct TexelSamples {
 }
 
 /// Takes `count`² samples in a texel of the environment map.
-fn sample_texel(maps: &[Map], rows: usize, column: usize, row: usize, count: usize) -> TexelSamples {
+fn supersample_texel(maps: &[Map], rows: usize, column: usize, row: usize, count: usize) -> TexelSampleStats {
     let (mut sum, mut least, mut most) = (DVec3::ZERO, f64::INFINITY, 0.0_f64);
     for index in 0..count * count {
         let offset = |index: usize| (index as f64 + 0.5) / count as f64;
         let u = (column as f64 + offset(index % count)) / (2 * rows) as f64;
         let v = (row as f64 + offset(index / count)) / rows as f64;
-        let direction = environment_direction(u, v);
+        let direction = glimt_map_direction(u, v);
         let radiance: DVec3 = maps.iter().map(|map| map.radiance(direction)).sum();
         (least, most) = (least.min(radiance.max_element()), most.max(radiance.max_element()));
         sum += radiance;
     }
     let mean = (sum / (count * count) as f64).as_vec3();
-    TexelSamples { mean, least: least as f32, most: most as f32 }
+    TexelSampleStats { mean, least: least as f32, most: most as f32 }
 }
 
 /// Resamples the sum of all maps and a constant as an equirectangular map. Takes more samples where
 /// neighboring texels differ strongly.
-fn resample(maps: &[Map], color: DVec3, rows: usize) -> Pixels {
+fn combine_as_equirectangular(maps: &[Map], color: DVec3, rows: usize) -> Pixels {
     let columns = 2 * rows;
-    let coarse: Vec<TexelSamples> = (0..rows * columns)
+    let coarse: Vec<TexelSampleStats> = (0..rows * columns)
         .into_par_iter()
-        .map(|index| sample_texel(maps, rows, index % columns, index / columns, SUBSAMPLES))
+        .map(|index| supersample_texel(maps, rows, index % columns, index / columns, SUBSAMPLES))
         .collect();
     let has_contrast = |column: usize, row: usize| {
         let (mut least, mut most) = (f32::INFINITY, 0.0_f32);
@@ -185,7 +187,7 @@ fn resample(maps: &[Map], color: DVec3, rows: usize) -> Pixels {
     let value = |index: usize| {
         let (column, row) = (index % columns, index / columns);
         let radiance = if has_contrast(column, row) {
-            sample_texel(maps, rows, column, row, FINE_SUBSAMPLES).mean
+            supersample_texel(maps, rows, column, row, FINE_SUBSAMPLES).mean
         } else {
             coarse[index].mean
         };
@@ -196,7 +198,7 @@ fn resample(maps: &[Map], color: DVec3, rows: usize) -> Pixels {
 }
 
 /// Direction of a point in glimt's environment maps. v = 0 is +y, and the center is −z.
-fn environment_direction(u: f64, v: f64) -> DVec3 {
+fn glimt_map_direction(u: f64, v: f64) -> DVec3 {
     let (sine, cosine) = libm::sincos(PI * v);
     let (across, along) = libm::sincos(TAU * (u - 0.5));
     DVec3::new(sine * across, cosine, -sine * along)
@@ -273,7 +275,7 @@ mod tests {
             to_light: DMat4::IDENTITY,
             hash: [0; 32],
         };
-        let resampled = resample(&[map], DVec3::ZERO, size);
+        let resampled = combine_as_equirectangular(&[map], DVec3::ZERO, size);
         let row_angle = PI / resampled.height as f64;
         let power: f64 = (0..resampled.height)
             .flat_map(|row| (0..resampled.width).map(move |column| (column, row)))
@@ -300,7 +302,7 @@ mod tests {
             crate::math::DVec4::W,
         );
         let map = Map { pixels, scale: 2.0, to_light: matrix.inverse(), hash: [0; 32] };
-        let resampled = resample(&[map], DVec3::new(0.0, 0.5, 0.0), 64);
+        let resampled = combine_as_equirectangular(&[map], DVec3::new(0.0, 0.5, 0.0), 64);
         assert_eq!(resampled.get(17, 10), DVec3::new(2.0, 0.5, 0.0), "upper half");
         assert_eq!(resampled.get(90, 50), DVec3::new(0.0, 0.5, 2.0), "lower half");
     }

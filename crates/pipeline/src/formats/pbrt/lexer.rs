@@ -79,7 +79,7 @@ impl<'a> Lexer<'a> {
     }
 
     /// An empty span at the end of the text.
-    pub(super) fn end(&self) -> Range<usize> {
+    pub(super) fn end_span(&self) -> Range<usize> {
         let end = self.base + self.text.trim_end().len();
         end..end
     }
@@ -111,10 +111,10 @@ impl<'a> Lexer<'a> {
         };
         self.at = start + length.unwrap_or(rest.len());
         let text = Cow::Borrowed(&self.text[start..self.at]);
-        Ok(Some(Token { kind, text, span: self.span(start..self.at) }))
+        Ok(Some(Token { kind, text, span: self.global_span(start..self.at) }))
     }
 
-    fn span(&self, local: Range<usize>) -> Range<usize> {
+    fn global_span(&self, local: Range<usize>) -> Range<usize> {
         self.base + local.start..self.base + local.end
     }
 
@@ -139,7 +139,7 @@ impl<'a> Lexer<'a> {
         loop {
             match bytes.get(at) {
                 None | Some(b'\n') => {
-                    let line = self.span(start..at.min(bytes.len()));
+                    let line = self.global_span(start..at.min(bytes.len()));
                     return Err(PbrtError::new(line, "this string has no closing quote"));
                 }
                 Some(b'"') => break,
@@ -151,7 +151,7 @@ impl<'a> Lexer<'a> {
             }
         }
         self.at = at + 1;
-        let span = self.span(start..self.at);
+        let span = self.global_span(start..self.at);
         if at - start > MAX_STRING_BYTES {
             return Err(PbrtError::new(span.start..span.start + 1, "this string is longer than 64 KiB"));
         }
@@ -180,7 +180,7 @@ impl<'a> Lexer<'a> {
                 Some('f') => '\u{c}',
                 Some(same @ ('\\' | '\'' | '"')) => same,
                 _ => {
-                    let span = self.span(start + at..start + at + 1);
+                    let span = self.global_span(start + at..start + at + 1);
                     return Err(PbrtError::new(span, "unknown escape sequence").with_help(
                         "a backslash must be followed by one of \" \\ ' n r t b f; use / in paths",
                     ));
@@ -228,6 +228,6 @@ mod tests {
         let mut lexer = Lexer::new(" # c\n a b", 0);
         assert_eq!(lexer.peek(), lexer.next());
         assert_eq!(lexer.next().expect("a token").map(|token| token.span), Some(8..9));
-        assert_eq!((lexer.next(), lexer.end()), (Ok(None), 9..9));
+        assert_eq!((lexer.next(), lexer.end_span()), (Ok(None), 9..9));
     }
 }

@@ -41,12 +41,12 @@ impl PbrtConverter<'_> {
             "infinite" => self.read_infinite(light, &matrix, infinite)?,
             "goniometric" => {
                 let text = "a point light with the same intensity in every direction is used";
-                self.notes.substitute_light("light `goniometric`", text, span);
+                self.notes.substitute_changing_lighting("light `goniometric`", text, span);
                 entity.parameters.ignore(&["filename"]);
                 self.convert_point(light, &matrix)?;
             }
             "projection" => {
-                self.notes.substitute_light("light `projection`", "skipped", span);
+                self.notes.substitute_changing_lighting("light `projection`", "skipped", span);
                 entity.parameters.ignore(&["filename", "fov", "scale", "power"]);
             }
             other => {
@@ -156,7 +156,7 @@ impl PbrtConverter<'_> {
         if scale < 0.0 {
             return Err(PbrtError::new(parameters.span_of("scale"), "`scale` cannot be negative"));
         }
-        if self.is_tolerated_missing(&file, "map of an infinite light", "its light is gray") {
+        if self.tolerate_if_missing(&file, "map of an infinite light", "its light is gray") {
             infinite.color += DVec3::splat(0.5 * scale);
             return Ok(());
         }

@@ -1,11 +1,11 @@
 //! Writes the `[materials]` tables.
 
 use super::lexer::{PbrtError, PbrtResult};
-use super::materials::{BlendPart, MaterialModel};
+use super::materials::{BlendPart, ConvertedMaterial};
 use super::scene::{LoweredMaterial, PbrtConverter};
 use super::state::{Entity, MaterialReference};
 use super::texture_nodes::TextureNode;
-use super::textures::{PbrtTextureUse, texture_value};
+use super::textures::{PbrtTextureUse, texture_reference};
 use crate::formats::foreign::import::TableEntries;
 use crate::formats::rounding::shorten_color;
 use crate::math::DVec3;
@@ -53,7 +53,7 @@ impl PbrtConverter<'_> {
     }
 
     /// Finds the statement that defines a material. Also returns a name for its table.
-    fn resolve_material(
+    fn find_material_statement(
         &self,
         reference: &MaterialReference,
         span: &Range<usize>,
@@ -89,16 +89,16 @@ impl PbrtConverter<'_> {
             let message = "this material contains itself, or mixes are nested too deeply";
             return Err(PbrtError::new(span.clone(), message));
         }
-        let (entity, name) = self.resolve_material(reference, span)?;
+        let (entity, name) = self.find_material_statement(reference, span)?;
         let (entity, is_named) = (entity.clone(), matches!(reference, MaterialReference::Named(_)));
         let model = self.read_material(&entity, is_named)?;
         self.document.set_span_for_next_values(entity.span());
         match model {
-            MaterialModel::Invisible => Ok(self.lower_invisible(&name, properties)),
-            MaterialModel::Blend { parts, amount } => {
+            ConvertedMaterial::Invisible => Ok(self.lower_invisible(&name, properties)),
+            ConvertedMaterial::Blend { parts, amount } => {
                 self.lower_blend(&name, &parts, &amount, properties, &entity, depth)
             }
-            MaterialModel::Plain { mut keys, needs_uv, is_glass } => {
+            ConvertedMaterial::Plain { mut keys, needs_uv, is_glass } => {
                 let has_alpha = properties.alpha.is_some();
                 if is_glass && has_alpha {
                     let text = "it is ignored, and the surface has no holes";
@@ -107,7 +107,7 @@ impl PbrtConverter<'_> {
                 if is_glass && let Some(tint) = properties.tint {
                     keys.push(("tint", shorten_color(tint)));
                 }
-                let uses_image = self.push_shape_keys(&mut keys, properties, is_glass);
+                let uses_image = self.push_emission_and_opacity_keys(&mut keys, properties, is_glass);
                 let table = self.add_material_table(keys, &name, &entity.span());
                 Ok(LoweredMaterial::Table {
                     name: table,
@@ -126,7 +126,7 @@ impl PbrtConverter<'_> {
         let span = 0..0;
         self.notes.substitute("a light with the material `interface`", "its surface is black", span.clone());
         let mut keys: TableEntries = vec![("diffuse", 0.0.into())];
-        let needs_uv = self.push_shape_keys(&mut keys, properties, false);
+        let needs_uv = self.push_emission_and_opacity_keys(&mut keys, properties, false);
         let name = self.add_material_table(keys, name, &span);
         LoweredMaterial::Table { name, needs_uv, has_inside: false }
     }
@@ -148,7 +148,7 @@ impl PbrtConverter<'_> {
                 LoweredMaterial::Table { name, has_inside: false, .. } => names.push(name),
                 LoweredMaterial::Table { .. } => {
                     let text = "only the other material is used";
-                    self.notes.substitute_light("`mix` with a dielectric", text, span.clone());
+                    self.notes.substitute_changing_lighting("`mix` with a dielectric", text, span.clone());
                 }
                 LoweredMaterial::Invisible => {
                     let message = "an `interface` material cannot be mixed";
@@ -182,7 +182,7 @@ impl PbrtConverter<'_> {
     }
 
     /// Adds the keys for a shape's properties. Returns whether any of them is a texture.
-    fn push_shape_keys(
+    fn push_emission_and_opacity_keys(
         &mut self,
         keys: &mut TableEntries,
         properties: &ShapeProperties,
@@ -195,7 +195,7 @@ impl PbrtConverter<'_> {
                 Some(image) => {
                     uses_image = true;
                     let BuiltValue::Table(mut entries) =
-                        texture_value(self.texture(image, PbrtTextureUse::Color))
+                        texture_reference(self.texture(image, PbrtTextureUse::Color))
                     else {
                         return true;
                     };

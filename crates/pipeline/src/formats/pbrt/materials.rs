@@ -5,7 +5,7 @@ use super::lexer::{PbrtError, PbrtResult};
 use super::parameters::{Parameters, Text};
 use super::scene::PbrtConverter;
 use super::state::{ColorSpace, Entity};
-use super::texture_nodes::{ImageFilter, ImageNode, ImageWrap, TextureNode, TextureValue, UvMapping};
+use super::texture_nodes::{ImageFilter, ImageNode, ImageWrap, TextureNode, TextureValueKind, UvMapping};
 use super::textures::PbrtTextureUse;
 use crate::formats::foreign::import::TableEntries;
 use crate::formats::rounding::shorten_color;
@@ -23,7 +23,7 @@ pub(super) struct BlendPart {
 }
 
 /// A converted material, without the properties of shapes.
-pub(super) enum MaterialModel {
+pub(super) enum ConvertedMaterial {
     Plain {
         keys: TableEntries,
         /// Whether it uses texture coordinates or tangents.
@@ -82,7 +82,7 @@ struct MaterialReader<'w, 'a> {
 
 impl PbrtConverter<'_> {
     /// Reads a material. Named materials have their type in a parameter.
-    pub(super) fn read_material(&mut self, entity: &Entity, is_named: bool) -> PbrtResult<MaterialModel> {
+    pub(super) fn read_material(&mut self, entity: &Entity, is_named: bool) -> PbrtResult<ConvertedMaterial> {
         let parameters = &entity.parameters;
         let kind = match is_named {
             true => parameters.string("type")?.unwrap_or(&entity.kind).clone(),
@@ -105,10 +105,10 @@ impl PbrtConverter<'_> {
 }
 
 impl MaterialReader<'_, '_> {
-    fn read(mut self, kind: &Text, entity: &Entity) -> PbrtResult<MaterialModel> {
+    fn read(mut self, kind: &Text, entity: &Entity) -> PbrtResult<ConvertedMaterial> {
         let mut is_glass = false;
         match &*kind.text {
-            "" | "none" | "interface" => return Ok(MaterialModel::Invisible),
+            "" | "none" | "interface" => return Ok(ConvertedMaterial::Invisible),
             "mix" => return self.read_mix(),
             "diffuse" => self.color("diffuse", "reflectance", 0.5)?,
             "coateddiffuse" => self.read_coated_diffuse(entity)?,
@@ -125,7 +125,7 @@ impl MaterialReader<'_, '_> {
             "thindielectric" => {
                 self.keys.push(("type", "glass".into()));
                 self.keys.push(("thin", true.into()));
-                self.ior("eta", 1.5)?;
+                self.add_ior_key("eta", 1.5)?;
             }
             "diffusetransmission" => self.read_diffuse_transmission()?,
             "subsurface" => self.read_subsurface(entity)?,
@@ -133,18 +133,22 @@ impl MaterialReader<'_, '_> {
                 self.parameters.ignore(&["filename"]);
                 self.keys.push(("diffuse", 0.5.into()));
                 let text = "a gray diffuse surface is used";
-                self.writer.notes.substitute_light("material `measured`", text, entity.span());
+                self.writer.notes.substitute_changing_lighting("material `measured`", text, entity.span());
             }
             "hair" => self.read_hair(entity)?,
             other => return Err(unknown_material(other, kind)),
         }
         self.read_bump()?;
         self.read_normal_map()?;
-        Ok(MaterialModel::Plain { keys: self.keys, needs_uv: self.needs_uv, is_glass })
+        Ok(ConvertedMaterial::Plain { keys: self.keys, needs_uv: self.needs_uv, is_glass })
     }
 
     /// Reads a parameter that may be a texture or a constant.
-    fn node(&mut self, name: &'static str, value: TextureValue) -> PbrtResult<Option<TextureNode>> {
+    fn read_texture_node(
+        &mut self,
+        name: &'static str,
+        value: TextureValueKind,
+    ) -> PbrtResult<Option<TextureNode>> {
         let PbrtConverter { resolver, notes, .. } = &mut *self.writer;
         let node = resolver.parameter(self.parameters, name, value, self.space, notes)?;
         self.needs_uv |= node.as_ref().is_some_and(|node| node.as_constant().is_none());
@@ -153,14 +157,14 @@ impl MaterialReader<'_, '_> {
 
     /// Reads the color parameter `name` into `key`.
     fn color(&mut self, key: &'static str, name: &'static str, default: f64) -> PbrtResult<()> {
-        let node = self.node(name, TextureValue::REFLECTANCE)?;
+        let node = self.read_texture_node(name, TextureValueKind::REFLECTANCE)?;
         let node = node.unwrap_or(TextureNode::Constant(DVec3::splat(default)));
         let value = self.writer.color_value(&node);
         self.keys.push((key, value));
         Ok(())
     }
 
-    fn ior(&mut self, name: &'static str, default: f64) -> PbrtResult<()> {
+    fn add_ior_key(&mut self, name: &'static str, default: f64) -> PbrtResult<()> {
         let ior = self.read_ior(name, default)?;
         self.keys.push(("ior", ior.into()));
         Ok(())
@@ -183,10 +187,10 @@ impl MaterialReader<'_, '_> {
     fn roughness(&mut self, names: [&'static str; 3]) -> PbrtResult<Roughness> {
         let [both, u, v] = names;
         let is_remapped = self.parameters.bool("remaproughness", true)?;
-        let usual = self.node(both, TextureValue::Number)?;
+        let usual = self.read_texture_node(both, TextureValueKind::Number)?;
         let usual = usual.unwrap_or(TextureNode::Constant(DVec3::ZERO));
-        let along_u = self.node(u, TextureValue::Number)?.unwrap_or_else(|| usual.clone());
-        let along_v = self.node(v, TextureValue::Number)?.unwrap_or(usual);
+        let along_u = self.read_texture_node(u, TextureValueKind::Number)?.unwrap_or_else(|| usual.clone());
+        let along_v = self.read_texture_node(v, TextureValueKind::Number)?.unwrap_or(usual);
         let alpha = |node: &TextureNode| {
             let value = node.as_constant()?.x.max(0.0);
             Some(if is_remapped { value.sqrt() } else { value })
@@ -216,7 +220,7 @@ impl MaterialReader<'_, '_> {
     }
 
     /// Adds the roughness of a surface that cannot be anisotropic.
-    fn isotropic_roughness(&mut self, key: &'static str, names: [&'static str; 3]) -> PbrtResult<()> {
+    fn add_isotropic_roughness(&mut self, key: &'static str, names: [&'static str; 3]) -> PbrtResult<()> {
         match self.roughness(names)? {
             Roughness::Constant { roughness, anisotropy } => {
                 if anisotropy != 0.0 {
@@ -240,7 +244,7 @@ impl MaterialReader<'_, '_> {
         let ior = self.read_ior("eta", 1.5)?;
         self.keys.push(("ior", ior.max(1.0).into()));
         let roughness = ["roughness", "uroughness", "vroughness"];
-        self.isotropic_roughness("roughness", roughness)?;
+        self.add_isotropic_roughness("roughness", roughness)?;
         let is_smooth = self.keys.last().is_some_and(|(_, value)| *value == BuiltValue::Number(0.0));
         if !is_smooth {
             let text =
@@ -252,11 +256,11 @@ impl MaterialReader<'_, '_> {
 
     /// Reads the medium between the layers of a coated material.
     fn read_layer_medium(&mut self) -> PbrtResult<()> {
-        let albedo = self.node("albedo", TextureValue::REFLECTANCE)?;
+        let albedo = self.read_texture_node("albedo", TextureValueKind::REFLECTANCE)?;
         if albedo.is_some_and(|albedo| albedo.as_constant() != Some(DVec3::ZERO)) {
             let text = "the layer is clear";
             let span = self.parameters.span_of("albedo");
-            self.writer.notes.substitute_light("`albedo` of a coat", text, span);
+            self.writer.notes.substitute_changing_lighting("`albedo` of a coat", text, span);
         }
         self.parameters.ignore(&["thickness", "g", "maxdepth", "nsamples"]);
         Ok(())
@@ -264,8 +268,8 @@ impl MaterialReader<'_, '_> {
 
     fn read_dielectric(&mut self) -> PbrtResult<()> {
         self.keys.push(("type", "glass".into()));
-        self.ior("eta", 1.5)?;
-        self.isotropic_roughness("roughness", ["roughness", "uroughness", "vroughness"])
+        self.add_ior_key("eta", 1.5)?;
+        self.add_isotropic_roughness("roughness", ["roughness", "uroughness", "vroughness"])
     }
 
     /// Reads a conductor, either in air (`coat_ior` is 1) or under a coat with the index of refraction
@@ -277,15 +281,16 @@ impl MaterialReader<'_, '_> {
             false => ["roughness", "uroughness", "vroughness"],
         };
         self.keys.push(("type", "metal".into()));
-        let unbounded = TextureValue::Color(SpectrumUse::Unbounded);
-        let [eta, k] = [self.node(eta_name, unbounded)?, self.node(k_name, unbounded)?];
-        match self.node("reflectance", TextureValue::REFLECTANCE)? {
+        let unbounded = TextureValueKind::Color(SpectrumUse::Unbounded);
+        let [eta, k] =
+            [self.read_texture_node(eta_name, unbounded)?, self.read_texture_node(k_name, unbounded)?];
+        match self.read_texture_node("reflectance", TextureValueKind::REFLECTANCE)? {
             Some(_) if eta.is_some() || k.is_some() => {
                 let span = self.parameters.span_of("reflectance");
                 let message = format!("`reflectance` cannot be combined with `{eta_name}` and `{k_name}`");
                 return Err(PbrtError::new(span, message).with_help("remove one of them"));
             }
-            Some(reflectance) => self.push_reflectance(&reflectance, coat_ior),
+            Some(reflectance) => self.push_eta_k_from_reflectance(&reflectance, coat_ior),
             None => self.push_complex_ior(eta, k, coat_ior),
         }
         match self.roughness(roughness)? {
@@ -305,7 +310,7 @@ impl MaterialReader<'_, '_> {
     }
 
     /// Adds the complex index of refraction with η = 1 that has the given reflectance at normal incidence.
-    fn push_reflectance(&mut self, reflectance: &TextureNode, coat_ior: f64) {
+    fn push_eta_k_from_reflectance(&mut self, reflectance: &TextureNode, coat_ior: f64) {
         match reflectance.as_constant() {
             Some(color) => {
                 let k = |part: f64| {
@@ -341,7 +346,7 @@ impl MaterialReader<'_, '_> {
         self.read_conductor(true, ior)?;
         self.keys.push(("coat", 1.0.into()));
         self.keys.push(("coat_ior", ior.max(1.0).into()));
-        self.isotropic_roughness(
+        self.add_isotropic_roughness(
             "coat_roughness",
             ["interface.roughness", "interface.uroughness", "interface.vroughness"],
         )?;
@@ -352,7 +357,7 @@ impl MaterialReader<'_, '_> {
         let scale = TextureNode::Constant(DVec3::splat(self.parameters.float("scale", 1.0)?));
         let parts = [("diffuse", "reflectance"), ("diffuse_transmission", "transmittance")];
         for (key, name) in parts {
-            let node = self.node(name, TextureValue::REFLECTANCE)?;
+            let node = self.read_texture_node(name, TextureValueKind::REFLECTANCE)?;
             let node = node.unwrap_or(TextureNode::Constant(DVec3::splat(0.25)));
             let value = self.writer.color_value(&TextureNode::product(scale.clone(), node));
             self.keys.push((key, value));
@@ -363,31 +368,31 @@ impl MaterialReader<'_, '_> {
     /// Replaces a subsurface material with a diffuse base of the same albedo under a dielectric coat.
     fn read_subsurface(&mut self, entity: &Entity) -> PbrtResult<()> {
         self.keys.push(("type", "plastic".into()));
-        let unbounded = TextureValue::Color(SpectrumUse::Unbounded);
+        let unbounded = TextureValueKind::Color(SpectrumUse::Unbounded);
         let constant = |node: Option<TextureNode>, default: [f64; 3]| {
             node.and_then(|node| node.as_constant()).unwrap_or(DVec3::from(default))
         };
-        let absorption = constant(self.node("sigma_a", unbounded)?, [0.0011, 0.0024, 0.014]);
-        let scattering = constant(self.node("sigma_s", unbounded)?, [2.55, 3.21, 3.77]);
+        let absorption = constant(self.read_texture_node("sigma_a", unbounded)?, [0.0011, 0.0024, 0.014]);
+        let scattering = constant(self.read_texture_node("sigma_s", unbounded)?, [2.55, 3.21, 3.77]);
         let asymmetry = self.parameters.float("g", 0.0)?;
-        let reflectance = match self.node("reflectance", TextureValue::REFLECTANCE)? {
+        let reflectance = match self.read_texture_node("reflectance", TextureValueKind::REFLECTANCE)? {
             Some(reflectance) => reflectance,
             None => TextureNode::Constant(diffusion_albedo(absorption, scattering, asymmetry)),
         };
         let value = self.writer.color_value(&reflectance);
         self.keys.push(("diffuse", value));
-        self.ior("eta", 1.33)?;
-        self.isotropic_roughness("roughness", ["roughness", "uroughness", "vroughness"])?;
+        self.add_ior_key("eta", 1.33)?;
+        self.add_isotropic_roughness("roughness", ["roughness", "uroughness", "vroughness"])?;
         self.parameters.ignore(&["mfp", "name", "scale"]);
         let text = "a diffuse surface under a coat is used; no light passes through the object";
-        self.writer.notes.substitute_light("material `subsurface`", text, entity.span());
+        self.writer.notes.substitute_changing_lighting("material `subsurface`", text, entity.span());
         Ok(())
     }
 
     fn read_hair(&mut self, entity: &Entity) -> PbrtResult<()> {
-        let color = match self.node("reflectance", TextureValue::REFLECTANCE)? {
+        let color = match self.read_texture_node("reflectance", TextureValueKind::REFLECTANCE)? {
             Some(color) => Some(color),
-            None => self.node("color", TextureValue::REFLECTANCE)?,
+            None => self.read_texture_node("color", TextureValueKind::REFLECTANCE)?,
         };
         let brown = TextureNode::Constant(DVec3::new(0.22, 0.12, 0.05));
         let value = self.writer.color_value(&color.unwrap_or(brown));
@@ -395,11 +400,11 @@ impl MaterialReader<'_, '_> {
         let ignored = ["sigma_a", "eumelanin", "pheomelanin", "eta", "beta_m", "beta_n", "alpha"];
         self.parameters.ignore(&ignored);
         let text = "a diffuse surface is used";
-        self.writer.notes.substitute_light("material `hair`", text, entity.span());
+        self.writer.notes.substitute_changing_lighting("material `hair`", text, entity.span());
         Ok(())
     }
 
-    fn read_mix(&mut self) -> PbrtResult<MaterialModel> {
+    fn read_mix(&mut self) -> PbrtResult<ConvertedMaterial> {
         let names = self.parameters.strings("materials")?;
         let [first, second] = names else {
             let span = self.parameters.span_of("materials");
@@ -407,14 +412,16 @@ impl MaterialReader<'_, '_> {
         };
         let part = |text: &Text| BlendPart { name: text.text.clone(), span: text.span.clone() };
         let parts = [part(first), part(second)];
-        let amount = self.node("amount", TextureValue::Number)?;
+        let amount = self.read_texture_node("amount", TextureValueKind::Number)?;
         let amount = amount.unwrap_or(TextureNode::Constant(DVec3::splat(0.5)));
-        Ok(MaterialModel::Blend { parts, amount })
+        Ok(ConvertedMaterial::Blend { parts, amount })
     }
 
     /// Reads `displacement`, which becomes a bump map.
     fn read_bump(&mut self) -> PbrtResult<()> {
-        let Some(node) = self.node("displacement", TextureValue::Number)? else { return Ok(()) };
+        let Some(node) = self.read_texture_node("displacement", TextureValueKind::Number)? else {
+            return Ok(());
+        };
         let node = self.writer.without_missing_images(&node);
         if node.as_constant().is_some() {
             return Ok(());
@@ -431,7 +438,7 @@ impl MaterialReader<'_, '_> {
 
     fn read_normal_map(&mut self) -> PbrtResult<()> {
         let Some(file) = self.parameters.string("normalmap")?.cloned() else { return Ok(()) };
-        if self.writer.is_tolerated_missing(&file, "normal map", "the surface is smooth") {
+        if self.writer.tolerate_if_missing(&file, "normal map", "the surface is smooth") {
             return Ok(());
         }
         self.needs_uv = true;

@@ -6,7 +6,7 @@ use std::path::Path;
 use super::lexer::{PbrtError, PbrtResult};
 use super::parameters::{Parameters, Text};
 use super::scene::PbrtConverter;
-use super::shapes::Placement;
+use super::shapes::MaterialAndPlacement;
 use crate::assets::mesh::{load, load_from_bytes};
 use crate::assets::{AssetError, Companion, LoadedMesh, read_gzip_file};
 use crate::control::ignore_progress;
@@ -23,7 +23,7 @@ const SMALL_FILE_BYTES: u64 = 2048;
 const NO_USABLE_FACE: &str = "no usable face";
 
 /// Properties of a mesh file that are read before the file is loaded.
-struct MeshHeader {
+struct MeshFileProperties {
     has_normals: bool,
     has_uvs: bool,
     size: u64,
@@ -35,19 +35,19 @@ impl PbrtConverter<'_> {
     pub(super) fn convert_mesh_file(
         &mut self,
         parameters: &Parameters,
-        placement: &Placement<'_>,
+        placement: &MaterialAndPlacement<'_>,
     ) -> PbrtResult<()> {
-        let file = mesh_file_name(parameters)?.clone();
+        let file = required_filename(parameters)?.clone();
         if parameters.find("displacement").is_some() {
             let text = "the surface is not displaced";
             let span = parameters.span_of("displacement");
             self.notes.substitute("`displacement` of a shape", text, span);
         }
         parameters.ignore(&["edgelength", "displacement.edgelength"]);
-        if self.is_tolerated_missing(&file, "mesh", "skipped") {
+        if self.tolerate_if_missing(&file, "mesh", "skipped") {
             return Ok(());
         }
-        let is_compressed = is_gzip(&file.text);
+        let is_compressed = has_gzip_extension(&file.text);
         if !is_compressed && !file.text.to_lowercase().ends_with(".ply") {
             let error = PbrtError::new(file.span, "`plymesh` can only read PLY files");
             return Err(error.with_help("the file name must end with .ply or .ply.gz"));
@@ -82,11 +82,11 @@ impl PbrtConverter<'_> {
         }
         self.document.set_span_for_next_values(placement.span.clone());
         match placement.group {
-            Some(group) => self.document.group_list_table(group, "mesh"),
+            Some(group) => self.document.start_group_list_table(group, "mesh"),
             None => self.document.start_list_table("mesh"),
         }
         self.document.set("material", placement.material.clone());
-        let name = self.asset_name(&file);
+        let name = self.register_asset_file(&file);
         self.document.set("file", name);
         self.document.set_span_for_next_values(placement.span.clone());
         if header.is_some_and(|header| !header.has_normals) {
@@ -100,7 +100,7 @@ impl PbrtConverter<'_> {
 
     /// Reads the mesh of a `plymesh`. Returns `None` if it has no area.
     pub(super) fn load_mesh_file(&mut self, parameters: &Parameters) -> PbrtResult<Option<MeshData>> {
-        let file = mesh_file_name(parameters)?;
+        let file = required_filename(parameters)?;
         let path = self.asset_path(&file.text);
         match self.load_plain_or_gzip(&path) {
             Ok(loaded) => Ok(Some(MeshData::from_loaded(&loaded))),
@@ -110,7 +110,7 @@ impl PbrtConverter<'_> {
     }
 
     fn load_plain_or_gzip(&mut self, path: &Path) -> Result<LoadedMesh, AssetError> {
-        if !is_gzip(&path.to_string_lossy()) {
+        if !has_gzip_extension(&path.to_string_lossy()) {
             let loaded = load(path, &ignore_progress, self.token);
             let hash = loaded.as_ref().ok().map(|loaded| loaded.hash);
             self.companions.push(Companion { path: path.to_owned(), hash, stamp: None });
@@ -123,12 +123,12 @@ impl PbrtConverter<'_> {
     }
 }
 
-fn mesh_file_name(parameters: &Parameters) -> PbrtResult<&Text> {
+fn required_filename(parameters: &Parameters) -> PbrtResult<&Text> {
     let missing = || PbrtError::new(parameters.span.clone(), "this mesh has no `filename`");
     parameters.string("filename")?.ok_or_else(missing)
 }
 
-fn is_gzip(file: &str) -> bool {
+fn has_gzip_extension(file: &str) -> bool {
     file.to_lowercase().ends_with(".gz")
 }
 
@@ -138,7 +138,7 @@ fn stem(file: &str) -> String {
 }
 
 /// Reads the header of a PLY file. Returns `None` if the file is unreadable, which loading it will report.
-fn read_header(path: &Path) -> Option<MeshHeader> {
+fn read_header(path: &Path) -> Option<MeshFileProperties> {
     /// Maximum size of a header.
     const MAX_HEADER: u64 = 4096;
     let (file, metadata) = crate::system::file::open_regular_file(path).ok()?.ok()?;
@@ -155,5 +155,5 @@ fn read_header(path: &Path) -> Option<MeshHeader> {
     };
     let has_normals = has(&["nx"]);
     let has_uvs = has(&["u", "s", "texture_u", "texture_s"]);
-    Some(MeshHeader { has_normals, has_uvs, size: metadata.len() })
+    Some(MeshFileProperties { has_normals, has_uvs, size: metadata.len() })
 }

@@ -32,10 +32,10 @@ use std::path::{Path, PathBuf};
 use self::colors::ColorReader;
 use self::lexer::PbrtError;
 use self::parser::Parser;
-use self::scene::{AssetLocation, PbrtConverter};
+use self::scene::{AssetPathResolver, PbrtConverter};
 use self::texture_nodes::TextureResolver;
 use super::foreign::ForeignError;
-use super::foreign::import::{CopiedFile, check_scene_before_import, read_copied_files};
+use super::foreign::import::{CopiedFile, check_scene_before_import, read_files_to_copy};
 use super::foreign::sources::SourceReader;
 use super::{ForeignReadContext, ForeignScene, ImportedScene};
 use crate::assets::Companion;
@@ -43,7 +43,10 @@ use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::{SceneDocumentBuilder, SourceFiles};
 
 /// Reads a scene.
-pub(super) fn read(path: &Path, context: &ForeignReadContext<'_>) -> Result<ForeignScene, ForeignError> {
+pub(super) fn read_glimt_scene(
+    path: &Path,
+    context: &ForeignReadContext<'_>,
+) -> Result<ForeignScene, ForeignError> {
     read_scene(path, None, context).map(|(scene, _)| scene)
 }
 
@@ -53,10 +56,10 @@ pub(super) fn convert(
     folder: &str,
     context: &ForeignReadContext<'_>,
 ) -> Result<ImportedScene, ForeignError> {
-    check_scene_before_import(read(path, context)?, path)?;
+    check_scene_before_import(read_glimt_scene(path, context)?, path)?;
     let (ForeignScene { document, notes, substitutions, .. }, copies) =
         read_scene(path, Some(folder), context)?;
-    let mut files = read_copied_files(copies, context.token)?;
+    let mut files = read_files_to_copy(copies, context.token)?;
     let generated = document.generated_files().iter();
     files.extend(generated.map(|(name, file)| (PathBuf::from(name), file.bytes.to_vec())));
     Ok(ImportedScene { document, files, substitutions, notes })
@@ -79,12 +82,12 @@ fn read_scene(
     let mut writer = PbrtConverter::new(
         &statements,
         TextureResolver::new(&statements, &colors),
-        SceneDocumentBuilder::from_files(files.clone()),
-        AssetLocation::new(path, import),
+        SceneDocumentBuilder::empty_for_source_files(files.clone()),
+        AssetPathResolver::new(path, import),
         context.options,
         context.token,
     );
-    writer.write_all();
+    writer.convert_all();
     context.token.check_pause_and_cancel()?;
     let PbrtConverter { document, notes, errors, assets, companions: read, .. } = writer;
     companions.extend(read);

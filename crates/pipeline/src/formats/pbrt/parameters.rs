@@ -91,7 +91,8 @@ impl Parameters {
             lexer.next()?;
             let parameter = parse_parameter(&token, lexer)?;
             if parsed.list.iter().any(|known| known.name == parameter.name) {
-                let message = format!("the parameter `{}` appears twice", shown(&parameter.name));
+                let message =
+                    format!("the parameter `{}` appears twice", escape_and_truncate_name(&parameter.name));
                 return Err(PbrtError::new(parameter.span, message).with_help("remove one of them"));
             }
             if parsed.list.len() >= MAX_PARAMETERS {
@@ -136,7 +137,7 @@ impl Parameters {
     }
 
     /// Returns a parameter, or an error unless it has one of the types.
-    fn of_type(&self, name: &'static str, kinds: &[ParameterType]) -> PbrtResult<Option<&Parameter>> {
+    fn find_with_type(&self, name: &'static str, kinds: &[ParameterType]) -> PbrtResult<Option<&Parameter>> {
         let Some(found) = self.find(name) else { return Ok(None) };
         if kinds.contains(&found.kind) {
             return Ok(Some(found));
@@ -148,7 +149,7 @@ impl Parameters {
 
     /// Reads the numbers of a parameter, or returns an error unless their number is a multiple of `count`.
     fn numbers(&self, name: &'static str, kinds: &[ParameterType], count: usize) -> PbrtResult<&[f64]> {
-        let Some(found) = self.of_type(name, kinds)? else { return Ok(&[]) };
+        let Some(found) = self.find_with_type(name, kinds)? else { return Ok(&[]) };
         let numbers = found.numbers()?;
         if !numbers.len().is_multiple_of(count) {
             let message = format!("`{name}` must have groups of {count} numbers, but has {}", numbers.len());
@@ -166,7 +167,7 @@ impl Parameters {
     }
 
     pub(super) fn optional_float(&self, name: &'static str) -> PbrtResult<Option<f64>> {
-        let Some(found) = self.of_type(name, &[ParameterType::Float])? else { return Ok(None) };
+        let Some(found) = self.find_with_type(name, &[ParameterType::Float])? else { return Ok(None) };
         found.single(found.numbers()?).map(|number| Some(*number))
     }
 
@@ -182,7 +183,9 @@ impl Parameters {
     }
 
     pub(super) fn integers(&self, name: &'static str) -> PbrtResult<Vec<i64>> {
-        let Some(found) = self.of_type(name, &[ParameterType::Integer])? else { return Ok(Vec::new()) };
+        let Some(found) = self.find_with_type(name, &[ParameterType::Integer])? else {
+            return Ok(Vec::new());
+        };
         let whole = |number: &f64| {
             let is_whole = number.fract() == 0.0 && number.abs() <= f64::from(i32::MAX);
             is_whole.then_some(*number as i64).ok_or_else(|| {
@@ -210,7 +213,7 @@ impl Parameters {
     }
 
     pub(super) fn bool(&self, name: &'static str, default: bool) -> PbrtResult<bool> {
-        let Some(found) = self.of_type(name, &[ParameterType::Bool])? else { return Ok(default) };
+        let Some(found) = self.find_with_type(name, &[ParameterType::Bool])? else { return Ok(default) };
         match &found.values {
             Values::Flags(flags) => found.single(flags).copied(),
             Values::Texts(_) | Values::Numbers(_) => {
@@ -222,12 +225,12 @@ impl Parameters {
 
     /// Reads a string. Treats empty strings as absent.
     pub(super) fn string(&self, name: &'static str) -> PbrtResult<Option<&Text>> {
-        let Some(found) = self.of_type(name, &[ParameterType::String])? else { return Ok(None) };
+        let Some(found) = self.find_with_type(name, &[ParameterType::String])? else { return Ok(None) };
         found.single(found.texts()?).map(|text| Some(text).filter(|text| !text.text.is_empty()))
     }
 
     pub(super) fn strings(&self, name: &'static str) -> PbrtResult<&[Text]> {
-        let Some(found) = self.of_type(name, &[ParameterType::String])? else { return Ok(&[]) };
+        let Some(found) = self.find_with_type(name, &[ParameterType::String])? else { return Ok(&[]) };
         found.texts()
     }
 
@@ -271,7 +274,7 @@ impl Parameters {
         let is_wrong = |parameter: &&Rc<Parameter>| !parameter.is_default && !parameter.is_used.get();
         let Some(wrong) = self.list.iter().find(is_wrong) else { return Ok(()) };
         wrong.is_used.set(true);
-        let message = format!("unknown parameter `{}`", shown(&wrong.name));
+        let message = format!("unknown parameter `{}`", escape_and_truncate_name(&wrong.name));
         let near = nearest_name(&wrong.name, self.asked.borrow().iter().copied());
         Err(PbrtError::new(wrong.span.clone(), message).with_suggestion(near))
     }
@@ -283,7 +286,7 @@ impl Parameter {
         match &self.values {
             Values::Numbers(numbers) => Ok(numbers),
             Values::Texts(_) | Values::Flags(_) => {
-                let message = format!("`{}` must be numbers", shown(&self.name));
+                let message = format!("`{}` must be numbers", escape_and_truncate_name(&self.name));
                 Err(PbrtError::new(self.values_span.clone(), message))
             }
         }
@@ -294,7 +297,7 @@ impl Parameter {
         match &self.values {
             Values::Texts(texts) => Ok(texts),
             Values::Numbers(_) | Values::Flags(_) => {
-                let message = format!("`{}` must be in quotes", shown(&self.name));
+                let message = format!("`{}` must be in quotes", escape_and_truncate_name(&self.name));
                 Err(PbrtError::new(self.values_span.clone(), message))
             }
         }
@@ -305,15 +308,18 @@ impl Parameter {
         match values {
             [one] => Ok(one),
             _ => {
-                let message =
-                    format!("`{}` must have one value, but has {}", shown(&self.name), values.len());
+                let message = format!(
+                    "`{}` must have one value, but has {}",
+                    escape_and_truncate_name(&self.name),
+                    values.len()
+                );
                 Err(PbrtError::new(self.values_span.clone(), message))
             }
         }
     }
 }
 
-fn shown(name: &str) -> String {
+fn escape_and_truncate_name(name: &str) -> String {
     escape_and_truncate(name, 40)
 }
 
@@ -333,7 +339,7 @@ fn parse_parameter(declaration: &Token<'_>, lexer: &mut Lexer<'_>) -> PbrtResult
 }
 
 fn unknown_type(kind: &str, span: Range<usize>) -> Box<PbrtError> {
-    let error = PbrtError::new(span, format!("unknown parameter type `{}`", shown(kind)));
+    let error = PbrtError::new(span, format!("unknown parameter type `{}`", escape_and_truncate_name(kind)));
     if OLD_TYPES.contains(&kind) {
         return error.with_label("this is a pbrt-v3 type").with_help(V3_HELP);
     }

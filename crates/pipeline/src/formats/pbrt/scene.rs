@@ -17,13 +17,13 @@ use crate::formats::foreign::{ForeignOptions, MissingAssetMode};
 use crate::formats::model::UsedNames;
 use crate::math::DMat4;
 use crate::scene::{GeneratedFile, SceneDocumentBuilder};
-use crate::system::file::{FileKind, file_kind};
+use crate::system::file::{FileKind, file_kind_and_metadata};
 
 /// Maximum number of errors to report.
 const MAX_ERRORS: usize = 50;
 
 /// Where the document's meshes and images are stored.
-pub(super) struct AssetLocation<'a> {
+pub(super) struct AssetPathResolver<'a> {
     /// Folder of the pbrt file.
     pub(super) source: PathBuf,
     /// Name of the pbrt file.
@@ -37,7 +37,7 @@ pub(super) struct AssetLocation<'a> {
     known: HashMap<PathBuf, String>,
 }
 
-impl<'a> AssetLocation<'a> {
+impl<'a> AssetPathResolver<'a> {
     pub(super) fn new(path: &Path, import: Option<&'a str>) -> Self {
         let source = path.parent().unwrap_or(Path::new("")).to_owned();
         let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -45,7 +45,7 @@ impl<'a> AssetLocation<'a> {
     }
 
     /// Returns the document's name for an existing file, and schedules the copy for an import.
-    fn name(&mut self, file: &str) -> String {
+    fn place_existing_file(&mut self, file: &str) -> String {
         let Some(folder) = self.import else { return file.to_owned() };
         let path = self.source.join(file);
         if let Some(known) = self.known.get(&path) {
@@ -94,7 +94,7 @@ pub(super) struct PbrtConverter<'a> {
     pub(super) document: SceneDocumentBuilder,
     pub(super) notes: NoteCollector,
     pub(super) errors: Vec<PbrtError>,
-    pub(super) assets: AssetLocation<'a>,
+    pub(super) assets: AssetPathResolver<'a>,
     pub(super) options: &'a ForeignOptions,
     pub(super) token: &'a CancelToken,
     pub(super) companions: Vec<Companion>,
@@ -112,7 +112,7 @@ impl<'a> PbrtConverter<'a> {
         statements: &'a Statements,
         resolver: TextureResolver<'a>,
         document: SceneDocumentBuilder,
-        assets: AssetLocation<'a>,
+        assets: AssetPathResolver<'a>,
         options: &'a ForeignOptions,
         token: &'a CancelToken,
     ) -> Self {
@@ -135,7 +135,7 @@ impl<'a> PbrtConverter<'a> {
     }
 
     /// Writes all tables. Stops after too many errors.
-    pub(super) fn write_all(&mut self) {
+    pub(super) fn convert_all(&mut self) {
         let file = self.assets.file.clone();
         self.document.add_comment_above_next_table(format!("{file}, as glimt shows it."));
         let is_rendered = self.convert_settings_and_camera();
@@ -163,9 +163,9 @@ impl<'a> PbrtConverter<'a> {
     }
 
     /// Returns the `file` key's value for an existing file.
-    pub(super) fn asset_name(&mut self, file: &Text) -> String {
+    pub(super) fn register_asset_file(&mut self, file: &Text) -> String {
         self.document.set_span_for_next_values(file.span.clone());
-        self.assets.name(&file.text)
+        self.assets.place_existing_file(&file.text)
     }
 
     /// Path of an asset in the pbrt scene.
@@ -174,13 +174,14 @@ impl<'a> PbrtConverter<'a> {
     }
 
     /// Whether a file is missing and `--missing note` tolerates that. If so, adds a substitution.
-    pub(super) fn is_tolerated_missing(&mut self, file: &Text, what: &str, substitute: &str) -> bool {
-        let is_file = matches!(file_kind(&self.asset_path(&file.text)), Ok((FileKind::Regular, _)));
+    pub(super) fn tolerate_if_missing(&mut self, file: &Text, what: &str, substitute: &str) -> bool {
+        let is_file =
+            matches!(file_kind_and_metadata(&self.asset_path(&file.text)), Ok((FileKind::Regular, _)));
         if is_file || self.options.missing != MissingAssetMode::Note {
             return false;
         }
         self.companions.push(Companion { path: self.asset_path(&file.text), hash: None, stamp: None });
-        self.notes.substitute_light(&format!("missing {what}"), substitute, file.span.clone());
+        self.notes.substitute_changing_lighting(&format!("missing {what}"), substitute, file.span.clone());
         true
     }
 

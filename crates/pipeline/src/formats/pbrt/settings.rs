@@ -115,7 +115,11 @@ impl PbrtConverter<'_> {
             "sppm" => self.convert_photons(parameters)?,
             "ao" | "function" => {
                 let text = "path tracing is used instead";
-                self.notes.substitute_light(&format!("integrator `{kind}`"), text, integrator.span());
+                self.notes.substitute_changing_lighting(
+                    &format!("integrator `{kind}`"),
+                    text,
+                    integrator.span(),
+                );
                 self.document.set("integrator", "path");
             }
             _ if PATHS.contains(&kind) => self.document.set("integrator", "path"),

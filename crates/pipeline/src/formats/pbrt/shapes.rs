@@ -24,7 +24,7 @@ const SHAPES: [&str; 8] =
 const OLD_SHAPES: [&str; 5] = ["cone", "paraboloid", "hyperboloid", "heightfield", "nurbs"];
 
 /// A shape's material and placement.
-pub(super) struct Placement<'a> {
+pub(super) struct MaterialAndPlacement<'a> {
     pub(super) material: String,
     /// Whether the material uses texture coordinates or tangents.
     pub(super) needs_uv: bool,
@@ -57,7 +57,7 @@ impl PbrtConverter<'_> {
         let entity = &shape.placed.entity;
         let (kind, span) = (&*entity.kind.text, entity.span());
         if kind == "curve" {
-            self.notes.substitute_light("shape `curve`", "skipped", span);
+            self.notes.substitute_changing_lighting("shape `curve`", "skipped", span);
             return Ok(());
         }
         if !SHAPES.contains(&kind) {
@@ -82,7 +82,7 @@ impl PbrtConverter<'_> {
         let (material, needs_uv, has_inside) = match material {
             LoweredMaterial::Table { name, needs_uv, has_inside } => (name, needs_uv, has_inside),
             LoweredMaterial::Invisible => {
-                self.ignore_shape_parameters(&entity.parameters);
+                self.mark_shape_parameters_used(&entity.parameters);
                 return Ok(());
             }
             LoweredMaterial::Invalid => return Ok(()),
@@ -91,7 +91,7 @@ impl PbrtConverter<'_> {
             let text = "a closed surface has glass inside, whatever its orientation";
             self.notes.note("`ReverseOrientation` of a dielectric", text, span.clone());
         }
-        let placement = Placement {
+        let placement = MaterialAndPlacement {
             material,
             needs_uv,
             emits: properties.emission.is_some(),
@@ -111,14 +111,14 @@ impl PbrtConverter<'_> {
     }
 
     /// Marks the parameters of a shape without a surface as used, since their values do not matter.
-    fn ignore_shape_parameters(&self, parameters: &Parameters) {
+    fn mark_shape_parameters_used(&self, parameters: &Parameters) {
         parameters.ignore(&["alpha", "P", "N", "uv", "indices"]);
     }
 
-    fn start_shape_table(&mut self, table: &'static str, placement: &Placement<'_>) {
+    fn start_shape_table(&mut self, table: &'static str, placement: &MaterialAndPlacement<'_>) {
         self.document.set_span_for_next_values(placement.span.clone());
         match placement.group {
-            Some(group) => self.document.group_list_table(group, table),
+            Some(group) => self.document.start_group_list_table(group, table),
             None => self.document.start_list_table(table),
         }
         self.document.set("material", placement.material.clone());
@@ -131,7 +131,12 @@ impl PbrtConverter<'_> {
     }
 
     /// Writes a mesh that exists only in memory.
-    pub(super) fn convert_mesh_data(&mut self, mut data: MeshData, stem: &str, placement: &Placement<'_>) {
+    pub(super) fn convert_mesh_data(
+        &mut self,
+        mut data: MeshData,
+        stem: &str,
+        placement: &MaterialAndPlacement<'_>,
+    ) {
         data.drop_degenerate_triangles();
         if data.triangles.is_empty() {
             self.notes.note("a mesh without area", "skipped", placement.span.clone());
@@ -154,7 +159,7 @@ impl PbrtConverter<'_> {
         &mut self,
         mut data: MeshData,
         parameters: &Parameters,
-        placement: &Placement<'_>,
+        placement: &MaterialAndPlacement<'_>,
     ) -> PbrtResult<()> {
         let levels = parameters.integer("levels", 3, 0..=i64::from(i32::MAX))?;
         parameters.ignore(&["scheme"]);
@@ -190,7 +195,7 @@ impl PbrtConverter<'_> {
         &mut self,
         kind: &str,
         parameters: &Parameters,
-        placement: &Placement<'_>,
+        placement: &MaterialAndPlacement<'_>,
     ) -> PbrtResult<()> {
         let round = read_round(kind, parameters)?;
         let is_whole = match kind {
@@ -232,7 +237,7 @@ impl PbrtConverter<'_> {
         Ok(())
     }
 
-    fn convert_sphere(&mut self, radius: f64, placement: &Placement<'_>) {
+    fn convert_sphere(&mut self, radius: f64, placement: &MaterialAndPlacement<'_>) {
         self.start_shape_table("sphere", placement);
         match similarity_scale(&placement.matrix).filter(|_| !placement.needs_uv) {
             Some(scale) => {
@@ -338,13 +343,13 @@ fn bilinear_mesh(parameters: &Parameters) -> PbrtResult<MeshData> {
             let along_v = (p01 - p00).lerp(p11 - p10, uv.x);
             let normal = match normals.is_empty() {
                 true => along_u.cross(along_v),
-                false => bilinear(at.map(|vertex| normals[vertex]), uv),
+                false => interpolate_bilinearly(at.map(|vertex| normals[vertex]), uv),
             };
-            (bilinear(corners, uv), normal.normalize_or_zero())
+            (interpolate_bilinearly(corners, uv), normal.normalize_or_zero())
         });
         if !uvs.is_empty() {
             let corners = at.map(|vertex| uvs[vertex]);
-            mesh.uvs.iter_mut().for_each(|uv| *uv = bilinear(corners, *uv));
+            mesh.uvs.iter_mut().for_each(|uv| *uv = interpolate_bilinearly(corners, *uv));
         }
         let start = all.positions.len() as u32;
         all.positions.extend(mesh.positions);
@@ -356,7 +361,7 @@ fn bilinear_mesh(parameters: &Parameters) -> PbrtResult<MeshData> {
 }
 
 /// Interpolates the values at the corners (0, 0), (1, 0), (0, 1) and (1, 1).
-fn bilinear<T>([a, b, c, d]: [T; 4], uv: DVec2) -> T
+fn interpolate_bilinearly<T>([a, b, c, d]: [T; 4], uv: DVec2) -> T
 where
     T: std::ops::Mul<f64, Output = T> + std::ops::Add<Output = T>,
 {

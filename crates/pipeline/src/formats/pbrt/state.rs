@@ -121,21 +121,25 @@ impl Default for GraphicsState {
 impl GraphicsState {
     /// Multiplies the active transforms by `matrix` on the right, so that it is applied to points first.
     pub(super) fn concat(&mut self, matrix: DMat4) {
-        self.change(|transform| transform * matrix);
+        self.map_active_transforms(|transform| transform * matrix);
     }
 
-    pub(super) fn change(&mut self, change: impl Fn(DMat4) -> DMat4) {
+    pub(super) fn map_active_transforms(&mut self, change: impl Fn(DMat4) -> DMat4) {
         for (transform, _) in self.transform.iter_mut().zip(self.active).filter(|(_, is_active)| *is_active) {
             *transform = change(*transform);
         }
     }
 
-    pub(super) fn defaults(&self, target: AttributeTarget) -> &[Rc<Parameter>] {
+    pub(super) fn default_parameters(&self, target: AttributeTarget) -> &[Rc<Parameter>] {
         &self.defaults[target as usize]
     }
 
     /// Adds the parameters of an `Attribute` statement as defaults.
-    pub(super) fn add_defaults(&mut self, target: AttributeTarget, parameters: Parameters) -> PbrtResult<()> {
+    pub(super) fn store_attribute_defaults(
+        &mut self,
+        target: AttributeTarget,
+        parameters: Parameters,
+    ) -> PbrtResult<()> {
         /// Maximum number of defaults per target.
         const MAX_DEFAULTS: usize = 1000;
         let span = parameters.span.clone();

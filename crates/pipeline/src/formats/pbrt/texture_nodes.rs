@@ -19,12 +19,12 @@ const MAX_NODES: usize = 256;
 
 /// Whether a texture is a color or a number. pbrt has separate namespaces for them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(super) enum TextureValue {
+pub(super) enum TextureValueKind {
     Color(SpectrumUse),
     Number,
 }
 
-impl TextureValue {
+impl TextureValueKind {
     /// A color that is a reflectance or transmittance.
     pub(super) const REFLECTANCE: Self = Self::Color(SpectrumUse::Reflectance);
 }
@@ -177,7 +177,7 @@ pub(super) struct TextureResolver<'a> {
     pub(super) statements: &'a Statements,
     pub(super) colors: &'a ColorReader<'a>,
     /// Textures resolved so far.
-    known: HashMap<(String, TextureValue), TextureNode>,
+    known: HashMap<(String, TextureValueKind), TextureNode>,
 }
 
 impl<'a> TextureResolver<'a> {
@@ -190,7 +190,7 @@ impl<'a> TextureResolver<'a> {
         &mut self,
         parameters: &Parameters,
         name: &'static str,
-        value: TextureValue,
+        value: TextureValueKind,
         space: ColorSpace,
         notes: &mut NoteCollector,
     ) -> PbrtResult<Option<TextureNode>> {
@@ -201,7 +201,7 @@ impl<'a> TextureResolver<'a> {
         &mut self,
         parameters: &Parameters,
         name: &'static str,
-        value: TextureValue,
+        value: TextureValueKind,
         space: ColorSpace,
         notes: &mut NoteCollector,
         depth: usize,
@@ -212,12 +212,13 @@ impl<'a> TextureResolver<'a> {
             return self.named(text, value, notes, depth).map(Some);
         }
         match value {
-            TextureValue::Number => {
+            TextureValueKind::Number => {
                 Ok(parameters.optional_float(name)?.map(DVec3::splat).map(TextureNode::Constant))
             }
-            TextureValue::Color(usage) => {
-                self.colors.color_of(found, space, usage).map(|color| Some(TextureNode::Constant(color)))
-            }
+            TextureValueKind::Color(usage) => self
+                .colors
+                .color_from_parameter(found, space, usage)
+                .map(|color| Some(TextureNode::Constant(color))),
         }
     }
 
@@ -225,7 +226,7 @@ impl<'a> TextureResolver<'a> {
     fn named(
         &mut self,
         name: &Text,
-        value: TextureValue,
+        value: TextureValueKind,
         notes: &mut NoteCollector,
         depth: usize,
     ) -> PbrtResult<TextureNode> {
@@ -238,8 +239,8 @@ impl<'a> TextureResolver<'a> {
             return Err(PbrtError::new(name.span.clone(), message));
         }
         let (textures, kind) = match value {
-            TextureValue::Number => (&self.statements.float_textures, "float"),
-            TextureValue::Color(_) => (&self.statements.spectrum_textures, "spectrum"),
+            TextureValueKind::Number => (&self.statements.float_textures, "float"),
+            TextureValueKind::Color(_) => (&self.statements.spectrum_textures, "spectrum"),
         };
         let Some(texture) = textures.get(&name.text) else {
             let near = nearest_name(&name.text, textures.keys().map(String::as_str));
@@ -260,7 +261,7 @@ impl<'a> TextureResolver<'a> {
     fn resolve(
         &mut self,
         texture: &PlacedEntity,
-        value: TextureValue,
+        value: TextureValueKind,
         notes: &mut NoteCollector,
         depth: usize,
     ) -> PbrtResult<TextureNode> {
@@ -277,13 +278,13 @@ impl<'a> TextureResolver<'a> {
                 let tex = part(self, "tex", 1.0)?;
                 // `scale` is a number even in color textures.
                 let space = entity.color_space;
-                let number = TextureValue::Number;
+                let number = TextureValueKind::Number;
                 let scale = self.parameter_at_depth(parameters, "scale", number, space, notes, depth + 1)?;
                 TextureNode::product(tex, scale.unwrap_or(TextureNode::Constant(DVec3::ONE)))
             }
             "mix" => {
                 let (first, second) = (part(self, "tex1", 0.0)?, part(self, "tex2", 1.0)?);
-                let (space, number) = (entity.color_space, TextureValue::Number);
+                let (space, number) = (entity.color_space, TextureValueKind::Number);
                 let amount =
                     self.parameter_at_depth(parameters, "amount", number, space, notes, depth + 1)?;
                 let amount = amount.unwrap_or(TextureNode::Constant(DVec3::splat(0.5)));
@@ -293,7 +294,7 @@ impl<'a> TextureResolver<'a> {
                 let (first, second) = (part(self, "tex1", 0.0)?, part(self, "tex2", 1.0)?);
                 parameters.ignore(&["dir"]);
                 let text = "the mean of the two textures is used";
-                notes.substitute_light("texture `directionmix`", text, entity.span());
+                notes.substitute_changing_lighting("texture `directionmix`", text, entity.span());
                 TextureNode::mix(first, second, TextureNode::Constant(DVec3::splat(0.5)))
             }
             "checkerboard" => {
@@ -325,17 +326,21 @@ impl<'a> TextureResolver<'a> {
             "fbm" | "wrinkled" | "windy" | "marble" => noise_node(texture, notes)?,
             "ptex" => {
                 parameters.ignore(&["filename", "encoding", "scale"]);
-                notes.substitute_light("texture `ptex`", "a constant of 0.5 is used", entity.span());
+                notes.substitute_changing_lighting(
+                    "texture `ptex`",
+                    "a constant of 0.5 is used",
+                    entity.span(),
+                );
                 TextureNode::Constant(DVec3::splat(0.5))
             }
-            other => return Err(unknown_texture(other, &entity.kind)),
+            other => return Err(unknown_texture_type_error(other, &entity.kind)),
         };
         parameters.check_all_used()?;
         Ok(node)
     }
 }
 
-fn unknown_texture(kind: &str, at: &Text) -> Box<PbrtError> {
+fn unknown_texture_type_error(kind: &str, at: &Text) -> Box<PbrtError> {
     const NAMES: [&str; 13] = [
         "constant",
         "scale",
@@ -380,7 +385,7 @@ fn uv_mapping(texture: &PlacedEntity, notes: &mut NoteCollector) -> PbrtResult<U
 
 fn image_node(
     texture: &PlacedEntity,
-    value: TextureValue,
+    value: TextureValueKind,
     notes: &mut NoteCollector,
 ) -> PbrtResult<ImageNode> {
     let parameters = &texture.entity.parameters;
@@ -429,7 +434,7 @@ fn image_node(
         wrap,
         filter,
         is_linear,
-        is_number: value == TextureValue::Number,
+        is_number: value == TextureValueKind::Number,
         factor: DVec3::splat(parameters.float("scale", 1.0)?),
         is_inverted: parameters.bool("invert", false)?,
     })

@@ -26,7 +26,7 @@ impl PbrtConverter<'_> {
         if let Some(color) = node.as_constant() {
             return shorten_color(color);
         }
-        texture_value(self.texture(node, PbrtTextureUse::Color))
+        texture_reference(self.texture(node, PbrtTextureUse::Color))
     }
 
     /// Returns the value of a number key: a number or a texture reference.
@@ -42,7 +42,7 @@ impl PbrtConverter<'_> {
     /// Replaces missing images with gray if `--missing note` tolerates them.
     pub(super) fn without_missing_images(&mut self, node: &TextureNode) -> TextureNode {
         if let TextureNode::Image(image) = node
-            && self.is_tolerated_missing(&image.file, "image", "gray is used")
+            && self.tolerate_if_missing(&image.file, "image", "gray is used")
         {
             return TextureNode::Constant(DVec3::splat(0.5));
         }
@@ -75,14 +75,14 @@ impl PbrtConverter<'_> {
     /// Returns the name of a texture's table, adding the table if it is new.
     pub(super) fn texture(&mut self, node: &TextureNode, usage: PbrtTextureUse) -> String {
         let (keys, name) = match node {
-            TextureNode::Image(image) if self.is_plain_image(image, usage) => {
+            TextureNode::Image(image) if self.can_use_image_unbaked(image, usage) => {
                 (self.image_keys(image, usage), file_stem(&image.file.text))
             }
             TextureNode::Checker(mapping, parts) => match (parts[0].as_constant(), parts[1].as_constant()) {
                 (Some(first), Some(second)) => {
                     (checker_keys(*mapping, [first, second]), "checker".to_owned())
                 }
-                _ => self.baked_keys(node, usage),
+                _ => self.bake_texture(node, usage),
             },
             TextureNode::Noise { octaves, factor } => (noise_keys(*octaves, *factor), "noise".to_owned()),
             TextureNode::Constant(_)
@@ -90,7 +90,7 @@ impl PbrtConverter<'_> {
             | TextureNode::Product(_)
             | TextureNode::Mix(_)
             | TextureNode::Power(..)
-            | TextureNode::Bilinear(..) => self.baked_keys(node, usage),
+            | TextureNode::Bilinear(..) => self.bake_texture(node, usage),
         };
         self.add_texture_table(keys, &name)
     }
@@ -109,7 +109,7 @@ impl PbrtConverter<'_> {
     }
 
     /// Whether glimt can use the image file directly, without baking.
-    fn is_plain_image(&mut self, image: &ImageNode, usage: PbrtTextureUse) -> bool {
+    fn can_use_image_unbaked(&mut self, image: &ImageNode, usage: PbrtTextureUse) -> bool {
         if image.wrap == ImageWrap::Black || image.mapping.scale.min_element() == 0.0 {
             return false;
         }
@@ -125,7 +125,7 @@ impl PbrtConverter<'_> {
     }
 
     fn image_keys(&mut self, image: &ImageNode, usage: PbrtTextureUse) -> TableEntries {
-        let mut keys: TableEntries = vec![("file", self.asset_name(&image.file).into())];
+        let mut keys: TableEntries = vec![("file", self.register_asset_file(&image.file).into())];
         match image.wrap {
             ImageWrap::Repeat | ImageWrap::Black => {}
             ImageWrap::Clamp => keys.push(("wrap", "clamp".into())),
@@ -158,7 +158,7 @@ impl PbrtConverter<'_> {
 }
 
 /// Value of a key that references a texture.
-pub(super) fn texture_value(name: String) -> BuiltValue {
+pub(super) fn texture_reference(name: String) -> BuiltValue {
     BuiltValue::Table(vec![("texture", name.into())])
 }
 

@@ -7,7 +7,7 @@ use crate::output::FileIdentity;
 
 /// A process's checkpoint state, which persists across requests.
 #[derive(Debug, Default)]
-pub(crate) struct CheckpointLock {
+pub(crate) struct ProcessCheckpointState {
     /// The checkpoint that this process wrote or resumed from. The file stays open and locked, so that other
     /// processes can detect the lock and the file's identity cannot be reused.
     held: Option<File>,
@@ -18,7 +18,7 @@ pub(crate) struct CheckpointLock {
     failed: Option<u64>,
 }
 
-impl CheckpointLock {
+impl ProcessCheckpointState {
     /// Keeps a file open after this process has written and locked it.
     pub(super) fn keep_open(&mut self, path: &Path, file: Option<File>) {
         (self.held, self.last_reported) = (file, FileIdentity::from_existing_or_new_path(path));
@@ -54,7 +54,7 @@ impl CheckpointLock {
     }
 
     /// Records a failure and returns whether it is the first failure in the request.
-    pub(super) fn record_first_failure_of_request(&mut self, request: u64) -> bool {
+    pub(super) fn record_failure_and_is_first(&mut self, request: u64) -> bool {
         self.failed.replace(request) != Some(request)
     }
 
@@ -81,7 +81,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.checkpoint");
         std::fs::write(&path, "first").expect("written");
-        let (mut one, mut other) = (CheckpointLock::default(), CheckpointLock::default());
+        let (mut one, mut other) = (ProcessCheckpointState::default(), ProcessCheckpointState::default());
         assert!(!one.is_held_by_this_process(&path) && !one.is_held_by_another_process(&path));
         one.lock_abandoned_checkpoint(&path);
         assert!(one.is_held_by_this_process(&path) && !one.is_held_by_another_process(&path));
@@ -103,7 +103,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.checkpoint");
         std::fs::write(&path, "first").expect("written");
-        let mut lock = CheckpointLock::default();
+        let mut lock = ProcessCheckpointState::default();
         assert!(lock.record_first_report_of_file(&path) && !lock.record_first_report_of_file(&path));
         std::fs::write(folder.path().join("b"), "second").expect("written");
         std::fs::rename(folder.path().join("b"), &path).expect("renamed");

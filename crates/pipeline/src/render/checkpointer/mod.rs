@@ -9,7 +9,7 @@ use std::cell::{Cell, OnceCell, RefCell};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-pub(crate) use self::lock::CheckpointLock;
+pub(crate) use self::lock::ProcessCheckpointState;
 use self::state::NonFilmRenderState;
 use super::film_state::FilmState;
 use super::share::Shard;
@@ -20,8 +20,7 @@ use crate::integrators::RayCounters;
 use crate::messages;
 use crate::output::FilmEncodingSettings;
 use crate::output::part::{
-    ImageHeader, NamedRenderInput, PartFile, PartHeader, PartOrCheckpoint, PartShare,
-    render_input_differences,
+    ImageHeader, NamedRenderInput, PartFile, PartFileKind, PartHeader, PartShare, render_input_differences,
 };
 use crate::output::write::Durability;
 use crate::protocol::{CheckpointUpdate, Event};
@@ -35,7 +34,7 @@ const CHECKPOINT_EXTENSION: &str = ".checkpoint";
 
 /// Creates the header of a part or checkpoint file.
 pub(crate) fn create_header(
-    kind: PartOrCheckpoint,
+    kind: PartFileKind,
     state: &FilmState,
     identity: Vec<NamedRenderInput>,
     finish: &FilmEncodingSettings,
@@ -50,7 +49,7 @@ fn to_part_share(share: Option<&Shard>) -> PartShare {
         Some(share) => PartShare {
             index: share.index,
             count: share.count,
-            block_count: share.image_block_count(),
+            block_count: share.image_sample_block_count(),
             blocks: share.sample_block_indices().to_vec(),
         },
         None => PartShare { index: 1, count: 1, block_count: 0, blocks: Vec::new() },
@@ -83,7 +82,7 @@ pub(crate) struct CheckpointContext<'a> {
     pub(crate) inputs: &'a ProtectedInputs,
     pub(crate) sink: &'a EventSink,
     /// The process's checkpoint state.
-    pub(crate) lock: &'a RefCell<CheckpointLock>,
+    pub(crate) lock: &'a RefCell<ProcessCheckpointState>,
 }
 
 /// Saves and restores the checkpoints of one render.
@@ -129,7 +128,7 @@ impl<'a> Checkpointer<'a> {
         self.differences_from(head, state).is_empty() && has_rays
     }
 
-    fn create_header(&self, kind: PartOrCheckpoint, state: &FilmState) -> PartHeader {
+    fn create_header(&self, kind: PartFileKind, state: &FilmState) -> PartHeader {
         create_header(kind, state, self.current_render_inputs().to_vec(), &self.around.finish)
     }
 
@@ -160,7 +159,7 @@ impl<'a> Checkpointer<'a> {
     /// Removes the checkpoint once the image has been written, or saves a final one if checkpoints are kept.
     /// If the image was not written, saves a checkpoint if checkpoints are kept, the render was long, or the
     /// process is being terminated.
-    pub(crate) fn finish(
+    pub(crate) fn remove_or_save_checkpoint(
         &self,
         state: &FilmState,
         rays: RayCounters,
@@ -198,7 +197,7 @@ impl<'a> Checkpointer<'a> {
 
     fn report_failure(&self, why: &str) {
         let CheckpointContext { sink, lock, .. } = &self.around;
-        if lock.borrow_mut().record_first_failure_of_request(sink.generation) {
+        if lock.borrow_mut().record_failure_and_is_first(sink.generation) {
             self.send_update(CheckpointUpdate::Failed { message: format!("no checkpoint: {why}") });
         }
     }
@@ -212,7 +211,7 @@ impl<'a> Checkpointer<'a> {
 /// Reads the header and state of a valid checkpoint.
 fn read_checkpoint_header_and_state(path: &Path) -> Option<(PartHeader, NonFilmRenderState)> {
     let file = PartFile::open_and_validate(path, &CancelToken::new()).ok()?;
-    file.check_kind(PartOrCheckpoint::Checkpoint).ok()?;
+    file.check_kind(PartFileKind::Checkpoint).ok()?;
     let state: NonFilmRenderState = serde_json::from_value(file.state).ok()?;
     state.is_plausible().then_some((file.head, state))
 }

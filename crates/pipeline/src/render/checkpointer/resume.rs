@@ -5,7 +5,7 @@ use super::state::NonFilmRenderState;
 use super::{Checkpointer, not_a_checkpoint_message};
 use crate::control::CancelToken;
 use crate::messages;
-use crate::output::part::{self, PartError, PartFile, PartHeader, PartOrCheckpoint};
+use crate::output::part::{self, PartError, PartFile, PartFileKind, PartHeader};
 use crate::protocol::CheckpointUpdate;
 use crate::settings::ResumeMode;
 use crate::stages::AbortReason;
@@ -77,7 +77,7 @@ impl Checkpointer<'_> {
         }
         let path = self.output.clone();
         let file = match PartFile::open_and_validate(&self.output, &CancelToken::new()) {
-            Ok(file) if file.head.kind == PartOrCheckpoint::Part => file,
+            Ok(file) if file.head.kind == PartFileKind::Part => file,
             // Earlier checks ensure that a part never replaces a checkpoint.
             Ok(_) => return Ok(false),
             Err(error) => {
@@ -87,7 +87,7 @@ impl Checkpointer<'_> {
         };
         let mut differences = self.differences_from(&file.head, state);
         let PartHeader { scene, references, .. } = file.head.clone();
-        let head = PartHeader { scene, references, ..self.create_header(PartOrCheckpoint::Part, state) };
+        let head = PartHeader { scene, references, ..self.create_header(PartFileKind::Part, state) };
         if differences.is_empty() && file.head != head {
             differences.push("the output settings differ".to_owned());
         }
@@ -101,7 +101,7 @@ impl Checkpointer<'_> {
         if let Err(error) = file.restore_into_film(&state.film) {
             return refused(error);
         }
-        state.recount_samples();
+        state.update_sample_counts_from_film();
         state.is_finished_part = true;
         self.send_update(CheckpointUpdate::Finished { path });
         Ok(true)
@@ -116,7 +116,7 @@ impl Checkpointer<'_> {
             return Err(other(unlike));
         }
         let file = PartFile::open_and_validate(&self.path, &CancelToken::new())?;
-        file.check_kind(PartOrCheckpoint::Checkpoint)?;
+        file.check_kind(PartFileKind::Checkpoint)?;
         // Validate the whole file before changing anything.
         let damaged = |why: &str| PartError::Damaged { path: path.clone(), why: why.to_owned() };
         let read: NonFilmRenderState =
@@ -129,7 +129,7 @@ impl Checkpointer<'_> {
         }
         file.restore_into_film(&state.film)?;
         read.restore_into(state).ok_or_else(|| damaged("its state does not match the film"))?;
-        state.recount_samples();
+        state.update_sample_counts_from_film();
         if !state.has_at_most_samples(samples) {
             return Err(other(vec![messages::oversampled_checkpoint_message(samples)]));
         }

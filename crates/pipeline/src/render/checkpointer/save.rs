@@ -11,7 +11,7 @@ use super::{
 use crate::control::CancelToken;
 use crate::film::Film;
 use crate::integrators::RayCounters;
-use crate::output::part::{self, PartError, PartFile, PartHeader, PartOrCheckpoint};
+use crate::output::part::{self, PartError, PartFile, PartFileKind, PartHeader};
 use crate::output::write::{Durability, ExistingFilePolicy};
 use crate::output::{AttributeLossPolicy, OutputError};
 use crate::protocol::CheckpointUpdate;
@@ -69,7 +69,7 @@ impl Checkpointer<'_> {
             self.report_failure(&why);
             return false;
         }
-        let head = self.create_header(PartOrCheckpoint::Checkpoint, state);
+        let head = self.create_header(PartFileKind::Checkpoint, state);
         let written = serde_json::to_value(NonFilmRenderState::from_film_state(state, rays, seconds))
             .map_err(|error| OutputError::File { path: self.path.clone(), source: error.into() })
             .and_then(|value| self.save_and_keep_locked(&head, &state.film, &value, durability));
@@ -100,7 +100,7 @@ impl Checkpointer<'_> {
                     path.display(),
                     not_a_checkpoint_message(at)
                 )),
-                Ok(_) if PartFile::read_header(at).is_ok_and(|head| head.kind == PartOrCheckpoint::Part) => {
+                Ok(_) if PartFile::read_header(at).is_ok_and(|head| head.kind == PartFileKind::Part) => {
                     Err(OutputError::Refused { reason: finished_part_conflict_message(path) })
                 }
                 // Another process may have locked the file since the last check.
@@ -138,7 +138,7 @@ impl Checkpointer<'_> {
         let Some((head, there)) = read_checkpoint_header_and_state(&self.path) else {
             return match PartFile::read_header(&self.path) {
                 Err(PartError::Version { .. }) => self.back_up_unless_backup_is_longer(|_| false),
-                Ok(head) if head.kind == PartOrCheckpoint::Part => {
+                Ok(head) if head.kind == PartFileKind::Part => {
                     Err(finished_part_conflict_message(&self.path))
                 }
                 Ok(_)

@@ -3,8 +3,8 @@
 use std::time::{Duration, Instant};
 
 use super::work_rate::WorkAmount;
-use crate::film::{Film, ImageNoiseAndConvergence};
-use crate::protocol::NoisePrediction;
+use crate::film::{Film, NoiseAndConvergenceRate};
+use crate::protocol::NoiseAndTimeToNextLevel;
 use crate::render::noise_goals::MIN_SAMPLES;
 
 /// Minimum time before the first measurement and between measurements, each of which requires a sum over all
@@ -23,7 +23,7 @@ pub(crate) struct NoiseTracker {
 /// A noise measurement.
 #[derive(Clone, Copy, Debug)]
 struct NoiseMeasurement {
-    noise: ImageNoiseAndConvergence,
+    noise: NoiseAndConvergenceRate,
     /// Amount of work done when the noise was measured.
     done: f64,
     /// Seconds from the start of the stage to the measurement.
@@ -52,8 +52,8 @@ impl NoiseTracker {
         work: WorkAmount,
         rate: Option<f64>,
         left: Option<f64>,
-    ) -> Option<NoisePrediction> {
-        let NoiseMeasurement { noise: ImageNoiseAndConvergence { relative_error, power }, done, seconds } =
+    ) -> Option<NoiseAndTimeToNextLevel> {
+        let NoiseMeasurement { noise: NoiseAndConvergenceRate { relative_error, power }, done, seconds } =
             self.last_measurement?;
         // Returns the fraction of the noise that remains with `times` times as many samples.
         let fall = |times: f64| libm::pow(times, -0.5 * power);
@@ -61,7 +61,7 @@ impl NoiseTracker {
         let next = rate
             .zip(left)
             .and_then(|(rate, left)| predict_next_noise_milestone(by_now, work, rate, power, left));
-        Some(NoisePrediction { now: relative_error, seconds, next })
+        Some(NoiseAndTimeToNextLevel { now: relative_error, seconds, next })
     }
 }
 
@@ -109,7 +109,7 @@ mod tests {
 
     /// Noise of independent samples: 2.1 % after 100 units of work and 9 seconds.
     fn measured() -> NoiseTracker {
-        let noise = ImageNoiseAndConvergence { relative_error: 0.021, power: 1.0 };
+        let noise = NoiseAndConvergenceRate { relative_error: 0.021, power: 1.0 };
         NoiseTracker {
             due: Instant::now(),
             last_measurement: Some(NoiseMeasurement { noise, done: 100.0, seconds: 9.0 }),

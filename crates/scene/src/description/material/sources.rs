@@ -105,7 +105,7 @@ impl CoatSource {
 
     /// Returns [`CoatSource::NONE`] if the weight is 0, so that the other keys do not affect fingerprints.
     #[must_use]
-    pub fn none_if_zero_weight(self) -> Self {
+    pub fn cleared_if_zero_weight(self) -> Self {
         if self.exists() { self } else { Self::NONE }
     }
 }

@@ -54,14 +54,14 @@ impl KeyInTable<'_> {
     /// Reads a color or a texture.
     pub(in super::super) fn color_or_texture(&self, textures: &DefinedNames) -> Option<ColorSource> {
         if self.is_table() {
-            return self.inline_table_texture_index(textures).map(ColorSource::Texture);
+            return self.referenced_texture_index(textures).map(ColorSource::Texture);
         }
         self.reject_bare_texture_name(textures, COLOR_OR_TEXTURE)?;
         self.read_color_described_as(COLOR_OR_TEXTURE).map(|color| ColorSource::Constant(color.as_vec3()))
     }
 
     /// Reads the texture in `{ texture = "name" }`.
-    fn inline_table_texture_index(&self, textures: &DefinedNames) -> Option<usize> {
+    fn referenced_texture_index(&self, textures: &DefinedNames) -> Option<usize> {
         let table = self.inline_table()?;
         let texture = table.key("texture").index_by_name(textures);
         table.report_unknown_and_missing_keys();

@@ -16,7 +16,7 @@ use crate::system::file::{self, FileKind};
 impl KeyInTable<'_> {
     /// Reads the path of an existing file and resolves it against the scene's folder.
     pub(in super::super) fn existing_file(&self) -> Option<Spanned<PathBuf>> {
-        self.existing_file_with_extension(self.extensions())
+        self.existing_file_with_extension(self.allowed_file_extensions())
     }
 
     /// Like [`Self::existing_file`], for a file with one of the extensions `endings`. If the list is empty,
@@ -36,7 +36,7 @@ impl KeyInTable<'_> {
             return None;
         }
         let path = self.context.resolve_path(text);
-        if self.context.is_generated_file(text) {
+        if self.context.is_in_memory_file(text) {
             return Some(Spanned { value: path, span });
         }
         let may_be_meant = |found: &Path| {
@@ -64,7 +64,7 @@ impl KeyInTable<'_> {
     }
 
     /// Extensions of the key's files.
-    pub(in super::super) fn extensions(&self) -> &'static [&'static str] {
+    pub(in super::super) fn allowed_file_extensions(&self) -> &'static [&'static str] {
         if let ValueKind::File(extensions) = self.info.kind { extensions } else { &[] }
     }
 
@@ -105,7 +105,7 @@ fn lowercase_extension(text: &str) -> String {
 /// missing.
 fn check_regular_file(path: &Path) -> Result<(), (String, bool)> {
     let shown = escape_and_truncate(&path.to_string_lossy(), 200);
-    match file::file_kind(path) {
+    match file::file_kind_and_metadata(path) {
         Ok((FileKind::Regular, _)) => Ok(()),
         Ok((kind, _)) => Err((format!("{shown} is {}, not a file", kind.description()), false)),
         Err(error) if error.kind() == io::ErrorKind::NotFound && is_symlink(path) => {

@@ -35,7 +35,7 @@ impl MaterialReader<'_> {
     pub(super) fn read_normal_map(&self) -> Option<NormalMap> {
         let key = self.key("normal_map");
         let texture = key.index_by_name(self.textures);
-        let strength = self.constant("normal_strength");
+        let strength = self.untextured_number("normal_strength");
         self.warn_if_ineffective_without("normal_strength", "normal_map");
         let texture = texture?;
         let defined = self.defined_textures.as_ref().and_then(|list| list.get(texture));
@@ -51,13 +51,13 @@ impl MaterialReader<'_> {
 
     pub(super) fn read_bump(&self) -> Option<Bump> {
         let texture = self.key("bump").texture_with_optional_channel(self.textures);
-        let scale = self.constant("bump_scale");
+        let scale = self.untextured_number("bump_scale");
         self.warn_if_ineffective_without("bump_scale", "bump");
         texture.map(|(texture, channel)| Bump { texture, channel, scale })
     }
 
     pub(super) fn read_opacity_and_cutoff(&self) -> OpacitySource {
-        let (value, cutoff) = (self.number("opacity"), self.constant("opacity_cutoff"));
+        let (value, cutoff) = (self.number("opacity"), self.untextured_number("opacity_cutoff"));
         self.warn_if_ineffective_without("opacity_cutoff", "opacity");
         OpacitySource { value, cutoff }
     }
@@ -69,10 +69,10 @@ impl MaterialReader<'_> {
         let coat = CoatSource {
             weight: self.number("coat"),
             roughness: self.number("coat_roughness"),
-            ior: self.constant("coat_ior"),
+            ior: self.untextured_number("coat_ior"),
             tint: self.color_or_texture("coat_tint"),
         };
-        coat.none_if_zero_weight()
+        coat.cleared_if_zero_weight()
     }
 
     /// Reads the coat of a principled material, where some keys have two names.
@@ -85,7 +85,7 @@ impl MaterialReader<'_> {
             ..CoatSource::NONE
         };
         if !COAT_KEYS.iter().any(|name| self.key(name).is_present()) {
-            return clear.none_if_zero_weight();
+            return clear.cleared_if_zero_weight();
         }
         if let Some(span) = clearcoat.iter().find_map(|name| self.key(name).key_span()) {
             let issue = Issue::error(span, "the coat of this material is specified twice")

@@ -9,7 +9,7 @@ use crate::integrators::transport::interiors::{InteriorListPool, medium_transmit
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::view::PathAov;
 use crate::lights::{
-    EmissionModulation, Light, LightCenter, LightSamplePacket, LightSceneGeometry, LightSceneGeometryPacket,
+    EmissionModulation, EmitterObjectPacket, GeometryOfLight, Light, LightCenter, LightSamplePacket,
 };
 use crate::materials::bsdf::ratio;
 use crate::math::Vec3;
@@ -96,7 +96,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
                 let samples =
                     light.sample_unmodulated_packet(&self.row.from, &self.row.normal, self.used, &u);
                 let (mut values, active, response) =
-                    self.unoccluded_contributions(&samples, 1.0 / count as f32, simd);
+                    self.contributions_before_occlusion(&samples, 1.0 / count as f32, simd);
                 // Multiply by the emission texture.
                 if let Some(pattern) = light.emission_modulation() {
                     values = self.apply_emission_modulation(pattern, &samples, active, values);
@@ -122,7 +122,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
                         simd,
                     );
                     if let Some(fraction) = &mut fraction {
-                        self.competing.adjust_wide_fraction(fraction, &unweighted, &values);
+                        self.competing.adjust_wide_light_fraction(fraction, &unweighted, &values);
                     }
                 }
                 self.add_or_defer_samples(
@@ -215,7 +215,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             let traced = active & !self.row.below_horizon_mask(&samples.directions, simd);
             let (rays, ends) = self.shadow_rays(samples, traced);
             let light = (values, fraction);
-            self.add_light_along_shadow_rays((&rays, &ends, traced), &samples.sources, light, sums, simd);
+            self.trace_and_add_light((&rays, &ends, traced), &samples.sources, light, sums, simd);
         }
     }
 
@@ -223,7 +223,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     #[inline(always)]
     fn trace_and_add_pending_light(
         &self,
-        middle: Option<(LightCenter, LightSceneGeometry)>,
+        middle: Option<(LightCenter, GeometryOfLight)>,
         pending: &PendingLight,
         sums: &mut LightSums,
         simd: impl Simd,
@@ -255,9 +255,9 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         }
         let rays = RayPacket::from_soa(self.row.from, direction)
             .with_start_triangles(self.row.ray_start_triangles(&direction));
-        self.add_light_along_shadow_rays(
+        self.trace_and_add_light(
             (&rays, &ends, traced),
-            &LightSceneGeometryPacket::splat(source),
+            &EmitterObjectPacket::splat(source),
             (&pending.light, fraction.as_ref()),
             sums,
             simd,
@@ -267,10 +267,10 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     /// Traces the shadow rays in `traced` and adds the light that arrives along the unoccluded rays. Rays
     /// that are not traced have a `t_max` below 0.
     #[inline(always)]
-    pub fn add_light_along_shadow_rays(
+    pub fn trace_and_add_light(
         &self,
         (rays, ends, traced): (&RayPacket, &F32x16, u32),
-        sources: &LightSceneGeometryPacket,
+        sources: &EmitterObjectPacket,
         (values, fraction): (&Vec3x16, Option<&Vec3x16>),
         sums: &mut LightSums,
         simd: impl Simd,
@@ -289,14 +289,14 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         }
     }
 
-    /// Like [`SampleAllLights::add_light_along_shadow_rays`], for scenes with null interactions, where shadow
+    /// Like [`SampleAllLights::trace_and_add_light`], for scenes with null interactions, where shadow
     /// rays have a transmittance.
     #[cold]
     #[inline(never)]
     fn add_attenuated_light(
         &self,
         (rays, ends, traced): (&RayPacket, &F32x16, u32),
-        sources: &LightSceneGeometryPacket,
+        sources: &EmitterObjectPacket,
         (values, fraction): (&Vec3x16, Option<&Vec3x16>),
         sums: &mut LightSums,
     ) {
@@ -317,7 +317,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     /// Returns the unoccluded contribution of each sample, the mask of nonzero contributions, and the
     /// vertices' BSDF responses.
     #[inline(always)]
-    pub fn unoccluded_contributions(
+    pub fn contributions_before_occlusion(
         &self,
         samples: &LightSamplePacket,
         share: f32,
@@ -378,7 +378,7 @@ pub fn add_traversal_cost(
     sums: &mut Vec3x16,
 ) {
     for i in set_bit_lanes(traced) {
-        let work = tile.world.geometry.traversal_cost(&Ray { t_max: ends[i], ..rays.ray(i) });
+        let work = tile.world.geometry.ray_traversal_cost(&Ray { t_max: ends[i], ..rays.ray(i) });
         let sum = lane(sums, i) + Vec3::splat(work as f32);
         set_lane(sums, i, sum);
     }

@@ -309,7 +309,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             inverse[i] *= pick.weighed[i];
         }
         // Compute the unoccluded contributions.
-        let (mut values, active, response) = self.unoccluded_contributions(&samples, 1.0, simd);
+        let (mut values, active, response) = self.contributions_before_occlusion(&samples, 1.0, simd);
         let active = active & used;
         let mut fraction = self.splits_lobes.then(|| response.bsdf.wide_fraction());
         if MIS {
@@ -325,7 +325,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
                 simd,
             );
             if let Some(fraction) = &mut fraction {
-                self.competing.adjust_wide_fraction(fraction, &unweighted, &values);
+                self.competing.adjust_wide_light_fraction(fraction, &unweighted, &values);
             }
         }
         if active == 0 {
@@ -361,7 +361,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
                 pool.push(*row_number, (rays, ends, traced), &samples.sources, light, &places);
             }
             Some(_) | None => {
-                self.add_light_along_shadow_rays(
+                self.trace_and_add_light(
                     (&rays, &ends, traced),
                     &samples.sources,
                     (&values, fraction.as_ref()),

@@ -5,9 +5,9 @@ use crate::geometry::{Ray, ShapeHit};
 use crate::integrators::transport::batch::{BsdfValuesAndCosines, VertexBatch};
 use crate::integrators::transport::ray::PathRay;
 use crate::integrators::transport::tile::TileContext;
-use crate::lights::{LightHitPoint, LightSamplePacket, LightSceneGeometry, Side};
+use crate::lights::{GeometryOfLight, LightHitPoint, LightSamplePacket, Side};
 use crate::materials::Footprint;
-use crate::materials::bsdf::{BsdfValues, LobesToSample, ratio};
+use crate::materials::bsdf::{BsdfValuePacket, LobesToSample, ratio};
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Simd, Vec3x16, lane, set_lane};
 use crate::world::{Hit, MAX_NULL_INTERACTIONS};
@@ -83,7 +83,7 @@ impl CompetingTechnique {
                 }
             }
             LobesToSample::Narrow => {
-                let BsdfValues { wide, narrow, .. } = &response.bsdf;
+                let BsdfValuePacket { wide, narrow, .. } = &response.bsdf;
                 for i in 0..PACKET_SIZE {
                     let left = narrow_lobe_mis_factor(lane(wide, i), lane(narrow, i), weights[i]);
                     let value = lane(&values, i) * left;
@@ -100,7 +100,12 @@ impl CompetingTechnique {
     /// light from `unweighted` to `weighted`. Weights of narrow lobes leave the light from wide lobes
     /// unchanged.
     #[inline(never)]
-    pub fn adjust_wide_fraction(self, fraction: &mut Vec3x16, unweighted: &Vec3x16, weighted: &Vec3x16) {
+    pub fn adjust_wide_light_fraction(
+        self,
+        fraction: &mut Vec3x16,
+        unweighted: &Vec3x16,
+        weighted: &Vec3x16,
+    ) {
         match self {
             Self::Nothing | Self::Paths => {}
             Self::NarrowPaths | Self::Lobes(_) => {
@@ -244,7 +249,7 @@ impl TileContext<'_> {
         let normal = surface.normal;
         let at = world.texture_point(hit, &surface, |_| Footprint::POINT);
         let cosine = normal.dot(ray.direction);
-        let radiance = material.expected_emission(&at, cosine < 0.0, cosine, lookups);
+        let radiance = material.expected_emission_at(&at, cosine < 0.0, cosine, lookups);
         if radiance == Vec3::ZERO {
             return Vec3::ZERO;
         }
@@ -295,7 +300,7 @@ impl TileContext<'_> {
         let Ray { origin, direction, .. } = path.ray;
         let shadow = Ray::segment_ending_before_point(origin, origin + direction * hit.shape.t);
         if path.state.pdf > 0.0
-            && !self.world.has_zero_transmittance_along(&shadow, LightSceneGeometry::Object(hit.object))
+            && !self.world.has_zero_transmittance_along(&shadow, GeometryOfLight::Object(hit.object))
         {
             self.emitter_mis_weight(path, hit)
         } else {

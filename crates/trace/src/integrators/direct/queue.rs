@@ -211,7 +211,7 @@ impl DirectLightVertexQueue {
     }
 
     /// Groups of consecutive packets whose lights are sampled together.
-    pub fn light_sampling_groups(
+    pub fn jointly_sampled_packet_ranges(
         &self,
         tile: &TileContext<'_>,
     ) -> impl Iterator<Item = Range<usize>> + use<> {
@@ -349,18 +349,18 @@ impl DirectLightVertexQueue {
 
     /// Whether the light from wide lobes must be summed separately at a packet.
     pub fn splits_lobes(&self, row: &VertexBatch) -> bool {
-        self.choose_lobe_split(row) == WideNarrowLobeSplit::Mixed
+        self.choose_lobe_split(row) == ReflectedLightSplit::Mixed
     }
 
     /// How to divide a packet's reflected light.
-    fn choose_lobe_split(&self, row: &VertexBatch) -> WideNarrowLobeSplit {
+    fn choose_lobe_split(&self, row: &VertexBatch) -> ReflectedLightSplit {
         if self.arrived_diffuse.is_empty() || row.only_specular_before == 0 {
-            return WideNarrowLobeSplit::Unused;
+            return ReflectedLightSplit::Unused;
         }
         match (row.bsdf.has_wide_lobes(), row.bsdf.has_narrow_lobes()) {
-            (_, false) => WideNarrowLobeSplit::OnlyWide,
-            (false, true) => WideNarrowLobeSplit::OnlyNarrow,
-            (true, true) => WideNarrowLobeSplit::Mixed,
+            (_, false) => ReflectedLightSplit::OnlyWide,
+            (false, true) => ReflectedLightSplit::OnlyNarrow,
+            (true, true) => ReflectedLightSplit::Mixed,
         }
     }
 
@@ -383,9 +383,9 @@ impl DirectLightVertexQueue {
             PathAov::TraversalCost => arrived.light,
         };
         let diffuse = match self.choose_lobe_split(row) {
-            WideNarrowLobeSplit::Unused | WideNarrowLobeSplit::OnlyNarrow => None,
-            WideNarrowLobeSplit::OnlyWide => Some(light),
-            WideNarrowLobeSplit::Mixed => Some(row.times_throughput(&arrived.diffuse)),
+            ReflectedLightSplit::Unused | ReflectedLightSplit::OnlyNarrow => None,
+            ReflectedLightSplit::OnlyWide => Some(light),
+            ReflectedLightSplit::Mixed => Some(row.times_throughput(&arrived.diffuse)),
         };
         if let Some(diffuse) = diffuse {
             for i in set_bit_lanes(row.used) {
@@ -410,7 +410,7 @@ impl DirectLightVertexQueue {
 
 /// How a packet's reflected light is divided into light from wide lobes and light from narrow lobes.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum WideNarrowLobeSplit {
+enum ReflectedLightSplit {
     /// The parts are not needed.
     Unused,
     /// All lobes are wide.

@@ -5,7 +5,7 @@
 use crate::geometry::{Ray, ShapeHit};
 use crate::integrators::transport::batch::VertexBatch;
 use crate::integrators::transport::tile::TileContext;
-use crate::lights::{Light, LightCenter, LightSceneGeometry, Side};
+use crate::lights::{GeometryOfLight, Light, LightCenter, Side};
 use crate::math::Vec3;
 use crate::math::lanes::lane;
 use crate::scene::description::ShadowMode;
@@ -79,7 +79,7 @@ impl LobeRayWithoutSoftShadows<'_> {
                 (Ray::segment_ending_before_point(self.ray.origin, middle), source)
             }
             Some((LightCenter::Towards(direction), source)) => (Ray::new(self.ray.origin, direction), source),
-            None => (self.ray, LightSceneGeometry::Nothing),
+            None => (self.ray, GeometryOfLight::Nothing),
         };
         if self.row.is_direction_below_horizon(self.lane, segment.direction) {
             return Vec3::ZERO;

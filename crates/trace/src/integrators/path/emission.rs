@@ -110,7 +110,7 @@ impl CameraPathWavefront<'_, '_> {
             let radiance = vertex.emitted_radiance(path, self.counters);
             self.add_weighted_emission(path, radiance, weight);
         }
-        self.may_scatter()
+        self.is_below_max_depth()
     }
 
     /// Adds the emission of a surface that a path hits, multiplied by the path's MIS weight. Light samples

@@ -71,7 +71,7 @@ impl<'a> PathStepper<'a> for CameraPathWavefront<'a, '_> {
                     }
                 }
             }
-            Interaction::Hidden if self.may_scatter() => self.push_specular(*path),
+            Interaction::Hidden if self.is_below_max_depth() => self.push_specular(*path),
             Interaction::Hidden => {}
             Interaction::Nothing => self.add_mis_weighted_infinite_light(path),
         }
@@ -271,5 +271,5 @@ impl CameraPathWavefront<'_, '_> {
 /// Traversal cost of a path's ray up to the hit.
 fn count_traversal_cost_to_hit(tile: &TileContext<'_>, path: &PathRay, hit: Option<Hit>) -> u32 {
     let t_max = hit.map_or(path.ray.t_max, |hit| hit.shape.t);
-    tile.world.geometry.traversal_cost(&Ray { t_max, ..path.ray })
+    tile.world.geometry.ray_traversal_cost(&Ray { t_max, ..path.ray })
 }

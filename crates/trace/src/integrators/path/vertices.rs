@@ -16,7 +16,7 @@ use crate::scene::description::ShadowMode;
 
 impl CameraPathWavefront<'_, '_> {
     /// Whether paths may scatter at the current hits.
-    pub(super) fn may_scatter(&self) -> bool {
+    pub(super) fn is_below_max_depth(&self) -> bool {
         self.depth < self.tile.settings.render.max_depth
     }
 
@@ -66,13 +66,13 @@ impl CameraPathWavefront<'_, '_> {
         if bsdf.is_black() {
             return;
         }
-        self.queue_vertices(path, vertex, &bsdf, far);
+        self.queue_for_direct_lighting(path, vertex, &bsdf, far);
     }
 
     /// Queues the vertices of a non-specular surface for direct lighting. `far` is the medium behind the
     /// surface.
     #[inline(always)]
-    pub(super) fn queue_vertices(
+    pub(super) fn queue_for_direct_lighting(
         &mut self,
         path: &PathRay,
         vertex: &SurfaceVertex<'_>,

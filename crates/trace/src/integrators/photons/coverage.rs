@@ -8,7 +8,7 @@ use arrayvec::ArrayVec;
 use super::kernel::kernel_integral_over_polygon;
 use super::map::{GatherPoint, MAX_PLANE_DISTANCE, MIN_COSINE};
 use crate::geometry::local_geometry::{FlatOrRoundExtent, FlatPolygon, NearestSurface};
-use crate::geometry::{Aabb, LocalGeometry, Shape, ShapeHit};
+use crate::geometry::{Aabb, NearbyGeometry, Shape, ShapeHit};
 use crate::materials::{Bsdf, Material, NonSpecular};
 use crate::math::frame::Frame;
 use crate::math::{DVec2, DVec3};
@@ -167,11 +167,11 @@ impl KernelNeighborhood {
     /// Adds a shape and returns whether the coverage still has a closed form. `receives` returns whether
     /// photons are stored on the front (`true`) or the back.
     fn add_shape(&mut self, shape: &Shape, receives: impl Fn(bool) -> bool) -> bool {
-        match shape.local_geometry_near(self.point) {
-            LocalGeometry::Polygons(count) => (0..count)
-                .filter_map(|number| shape.polygon_face(number))
+        match shape.polygons_or_surface_near(self.point) {
+            NearbyGeometry::Polygons(count) => (0..count)
+                .filter_map(|number| shape.polygon_face_at(number))
                 .all(|piece| self.add_polygon_piece_or_wall(piece, &receives)),
-            LocalGeometry::Surface { distance, ground } => {
+            NearbyGeometry::Surface { distance, ground } => {
                 distance > SEARCH_RADIUS * self.radius
                     || ground.is_some_and(|ground| self.try_add_covering_surface(&ground, receives))
             }

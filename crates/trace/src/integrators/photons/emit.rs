@@ -119,7 +119,7 @@ struct PhotonWavefront<'a> {
 
 impl PhotonWavefront<'_> {
     /// Whether photons may scatter at the current hits.
-    fn may_scatter(&self) -> bool {
+    fn is_below_max_depth(&self) -> bool {
         self.depth < self.tracing.max_depth
     }
 
@@ -184,7 +184,7 @@ impl PhotonWavefront<'_> {
     /// Scatters photons at a packet of vertices. Directions are sampled in proportion to the cosine at the
     /// geometric normal, as required by the adjoint.
     fn scatter(&mut self, row: &mut VertexBatch) {
-        if !self.may_scatter() || row.used == 0 {
+        if !self.is_below_max_depth() || row.used == 0 {
             return;
         }
         for i in set_bit_lanes(row.used & row.has_facet) {

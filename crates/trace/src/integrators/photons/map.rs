@@ -219,7 +219,7 @@ impl PhotonMap {
         let chosen = choices
             .choose_one_lane_by_weight(random[1])
             .map(|(block, i)| self.position_and_normal(block as usize, i));
-        (Vec3::from(sums.map(sum_lanes)) * self.peak_weight(), chosen)
+        (Vec3::from(sums.map(sum_lanes)) * self.kernel_peak(), chosen)
     }
 
     /// Position and normal of a photon.
@@ -253,7 +253,7 @@ impl PhotonMap {
         simd: impl Simd,
         mut visit: impl FnMut(&Photon, f32),
     ) {
-        let peak = self.peak_weight();
+        let peak = self.kernel_peak();
         let ranges = self.candidate_ranges(look);
         for range in &ranges.of[..ranges.count] {
             for block in blocks_covering_photon_range(*range) {
@@ -267,7 +267,7 @@ impl PhotonMap {
 
     /// Kernel value at the center.
     #[inline(always)]
-    fn peak_weight(&self) -> f32 {
+    fn kernel_peak(&self) -> f32 {
         2.0 / (std::f32::consts::PI * (self.radius * self.radius))
     }
 

@@ -58,7 +58,7 @@ use crate::integrators::transport::tile::{SampleBlock, TileContext};
 use crate::lights::{BoundingSphere, PhotonEmitter};
 use crate::materials::{Dielectric, Material};
 use crate::scene::description::{RenderOptions, ShadowMode};
-use crate::world::{CompoundSolid, Hit, LightBallAndObjectBoxes, World, scene_photon_emitter};
+use crate::world::{CompoundSolid, Hit, LightBoundingBoxes, World, scene_photon_emitter};
 use emit::{PhotonTracer, StoredPhotonChunk};
 pub(super) use map::GatherPoint;
 pub use map::{Photon, PhotonMap};
@@ -139,7 +139,7 @@ impl PhotonPassTracer {
     ///
     /// # Errors
     /// [`Canceled`] if the token is canceled.
-    pub fn new_with_first_pass(
+    pub fn new_and_trace_first_pass(
         world: &World,
         settings: &RenderSettings,
         photons: PhotonSettings,
@@ -362,12 +362,13 @@ fn light_enclosing_glass_candidates(world: &World) -> (Vec<u32>, Vec<CompoundSol
     let light_boxes = world.finite_light_boxes();
     let may_contain_light = |object: &u32| {
         let bounds = world.geometry.objects()[*object as usize].bounds();
-        bounds.is_none_or(|bounds| light_boxes.iter().any(|light| light.may_light_intersect_box(&bounds)))
+        bounds
+            .is_none_or(|bounds| light_boxes.iter().any(|light| light.may_light_source_overlap_box(&bounds)))
     };
     let closed = world.closed_glass_shapes().map(|(object, _)| object).filter(may_contain_light).collect();
     // A solid closed by opaque surfaces may extend beyond its bounding box, so test the center and corners of
     // each light.
-    let encloses_light = |body: &CompoundSolid, light: &LightBallAndObjectBoxes| {
+    let encloses_light = |body: &CompoundSolid, light: &LightBoundingBoxes| {
         light
             .smaller_box_center_and_corners()
             .any(|point| world.glass_material_around_point(body, point, light.object).is_some())
@@ -375,7 +376,7 @@ fn light_enclosing_glass_candidates(world: &World) -> (Vec<u32>, Vec<CompoundSol
     let mut bodies = world.find_compound_glass_solids();
     bodies.retain(|body| {
         light_boxes.iter().any(|light| {
-            light.may_light_intersect_box(&body.bounds) || body.is_covered && encloses_light(body, light)
+            light.may_light_source_overlap_box(&body.bounds) || body.is_covered && encloses_light(body, light)
         })
     });
     (closed, bodies)

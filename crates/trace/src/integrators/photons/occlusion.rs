@@ -3,7 +3,7 @@
 use super::map::GatherPoint;
 use super::reservoir::PhotonPositionAndNormal;
 use crate::geometry::Ray;
-use crate::lights::LightSceneGeometry;
+use crate::lights::GeometryOfLight;
 use crate::world::Geometry;
 
 /// Height of the test segment above the surface, in kernel radii, chosen to clear the surface's own
@@ -34,7 +34,7 @@ pub fn is_photon_occluded(
     let is_blocked = |from, to| {
         geometry.is_occluded_except_by_light(
             &Ray::segment_ending_before_point(from, to),
-            LightSceneGeometry::Nothing,
+            GeometryOfLight::Nothing,
         )
     };
     let [from, to] = lifted(ABOVE);

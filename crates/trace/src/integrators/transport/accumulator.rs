@@ -1,7 +1,7 @@
 //! Accumulates the light components visible in the view, and the layers.
 
 use super::ray::PathRay;
-use crate::integrators::layers::{SampleLayer, SampleLayerValues};
+use crate::integrators::layers::{SampleBatchLayerValues, SampleLayer};
 use crate::integrators::view::{PathAov, RadianceComponentMask};
 use crate::math::Vec3;
 
@@ -47,7 +47,7 @@ impl PathDiffuseFractions {
 /// Layers recorded along with the radiance.
 pub struct LayerAccumulator<'a> {
     /// The layers' values.
-    pub values: &'a mut SampleLayerValues,
+    pub values: &'a mut SampleBatchLayerValues,
     /// The paths' diffuse fractions, or `None` if no component of the light is recorded.
     pub fractions: Option<&'a mut PathDiffuseFractions>,
 }
@@ -82,7 +82,7 @@ impl Accumulator<'_> {
 
     /// The layers, if any of them records a quantity at the first hit.
     #[inline]
-    pub fn first_hit_layers(&mut self) -> Option<&mut SampleLayerValues> {
+    pub fn first_hit_layers(&mut self) -> Option<&mut SampleBatchLayerValues> {
         self.layers
             .as_mut()
             .map(|layers| &mut *layers.values)

@@ -5,7 +5,7 @@ use super::vertex::{ScatteringGeometry, ShadingVertex};
 use crate::geometry::Ray;
 use crate::geometry::packet::set_bit_lanes;
 use crate::integrators::view::{PathAov, RadianceComponentMask};
-use crate::materials::bsdf::BsdfValues;
+use crate::materials::bsdf::BsdfValuePacket;
 use crate::materials::bxdf::ShadingGeometry;
 use crate::materials::{BsdfPacket, BxdfKind};
 use crate::math::Vec3;
@@ -349,7 +349,7 @@ impl VertexBatch {
 #[repr(align(64))]
 pub struct BsdfValuesAndCosines {
     /// BSDF values.
-    pub bsdf: BsdfValues,
+    pub bsdf: BsdfValuePacket,
     /// Cosines times the terminator factors. Not positive if the light is on the wrong side of a normal.
     pub cosines: F32x16,
 }

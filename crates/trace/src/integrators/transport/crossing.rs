@@ -39,7 +39,7 @@ pub struct CoincidentSurfaceBuffers {
 
 impl TileContext<'_> {
     /// Finds all surfaces that a ray crosses at a hit on glass.
-    pub fn find_interface_crossing(
+    pub fn interface_crossing_at_hit(
         &self,
         path: &PathRay,
         vertex: &SurfaceVertex<'_>,
@@ -117,8 +117,8 @@ impl TileContext<'_> {
     }
 
     /// The glass surface that separates two media at a hit, or `None` if both media are air. Must be called
-    /// after [`TileContext::find_interface_crossing`], with the same buffers.
-    pub fn separating_glass_surface(
+    /// after [`TileContext::interface_crossing_at_hit`], with the same buffers.
+    pub fn glass_interface_at_hit(
         &self,
         hit: &Hit,
         [near, far]: [&InteriorList; 2],

@@ -34,7 +34,7 @@ pub fn reflected_path(
     PathRay {
         ray: vertex.spawn_ray(direction.normalize()),
         throughput: path.throughput * reflectance,
-        path: path.continuation_path_number(REFLECTED),
+        path: path.child_path_number(REFLECTED),
         state: path.state.after_specular(reflectance.max_element()),
         cone: vertex.cone_after_specular(SpecularEvent::Reflected),
         ..*path
@@ -71,7 +71,7 @@ pub fn fresnel_split(
     // Path throughput applies to basic radiance, L/n², which refraction does not change.
     let refracted = direction.map(|direction| PathRay {
         ray: vertex.spawn_ray(direction),
-        path: path.continuation_path_number(REFRACTED),
+        path: path.child_path_number(REFRACTED),
         interiors: *far,
         state: path.state.after_specular(1.0),
         cone: vertex.cone_after_specular(SpecularEvent::Refracted(eta)),

@@ -18,7 +18,7 @@ use crate::materials::bsdf::ShownLobes;
 use crate::math::lanes::{F32x16, Simd, TRUE, Vec3x16, lane, set_lane};
 use crate::math::{DVec2, Vec3};
 use crate::scene::description::ShadowMode;
-use crate::world::{Hit, Object, PACKET_SIZE, PacketMaterial, SimdKernel};
+use crate::world::{Hit, Object, PACKET_SIZE, PacketShadingMaterial, SimdKernel};
 
 /// Number of rays traced between checks of the cancel token.
 pub const POLL_INTERVAL: usize = 256;
@@ -139,7 +139,10 @@ impl TileContext<'_> {
 
     /// Packet-shading data and non-specular BSDF of a material, or `None` if the material is not plain.
     #[inline(always)]
-    pub fn packet_material_if_plain(&self, material: usize) -> Option<(&PacketMaterial, &NonSpecular)> {
+    pub fn packet_material_if_plain(
+        &self,
+        material: usize,
+    ) -> Option<(&PacketShadingMaterial, &NonSpecular)> {
         let (plain, rough) = self.world.material_for_packet_shading(material)?;
         // A textured ambient color needs a lookup per surface.
         let has_ambient = self.settings.render.ambient != Vec3::ZERO;

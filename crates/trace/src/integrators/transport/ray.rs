@@ -83,7 +83,7 @@ impl PathHistory {
 
 impl PathRay {
     /// Path number for a continuation of this path. Each continuation has a different `branch`.
-    pub fn continuation_path_number(&self, branch: u32) -> u32 {
+    pub fn child_path_number(&self, branch: u32) -> u32 {
         // With XOR, path number 1 would remain 1 after each reflection, so all random choices along the path
         // would be the same.
         self.path.wrapping_add(branch).wrapping_mul(0x9e37_79b1).rotate_left(15).wrapping_add(branch)
@@ -118,7 +118,7 @@ mod tests {
         for _ in 0..12 {
             round = round
                 .iter()
-                .flat_map(|&path| [1, 2].map(|way| numbered(path).continuation_path_number(way)))
+                .flat_map(|&path| [1, 2].map(|way| numbered(path).child_path_number(way)))
                 .collect();
             assert!(round.iter().all(|&path| visited.insert(path)));
         }
@@ -126,7 +126,7 @@ mod tests {
             let (mut path, mut visited) = (CAMERA_PATH + 1, HashSet::from([CAMERA_PATH]));
             for length in 0..10_000 {
                 assert!(visited.insert(path), "branch {way} repeats after {length} bounces");
-                path = numbered(path).continuation_path_number(way);
+                path = numbered(path).child_path_number(way);
             }
         }
     }

@@ -141,7 +141,7 @@ impl BsdfSampler<'_> {
                 },
                 cone: cones.get(row.place[i] as usize).map_or(RayCone::default(), of_lobe(scattered.pdfs[i])),
             };
-            path.path = path.continuation_path_number(SCATTERED);
+            path.path = path.child_path_number(SCATTERED);
             path
         }));
         if let Some(fractions) = fractions {

@@ -89,12 +89,12 @@ impl SampleBlock {
 
     /// Returns a slot's column, row and sample index, in the image before mirroring.
     pub fn pixel_and_sample(&self, slot: u32) -> (u32, u32, u32) {
-        let (x, y, sample) = self.shown_pixel_and_sample(slot);
+        let (x, y, sample) = self.displayed_pixel_and_sample(slot);
         (self.mirrored_width.map_or(x, |width| width - 1 - x), y, sample)
     }
 
     /// Returns a slot's column, row and sample index, in the image as shown.
-    fn shown_pixel_and_sample(&self, slot: u32) -> (u32, u32, u32) {
+    fn displayed_pixel_and_sample(&self, slot: u32) -> (u32, u32, u32) {
         let samples = self.samples.len() as u32;
         let (pixel, sample) = (slot / samples, slot % samples);
         let (x, y) = self.pixels.image_position(pixel);
@@ -123,19 +123,19 @@ impl SampleBlock {
         // Map them to indices within the rectangle. This is a separate loop to keep the other loops free of
         // branches.
         if part != PixelSubset::All {
-            index = index.map(|pixel| part.index_in_rect(pixel, rect));
+            index = index.map(|pixel| part.nth_pixel_index_in_rect(pixel, rect));
         }
         for lane in 0..PACKET_SIZE {
             let y = by_width.quotient(index[lane]);
             xs[lane] = rect.x.wrapping_add(index[lane].wrapping_sub(y.wrapping_mul(rect.width)));
             ys[lane] = rect.y.wrapping_add(y);
         }
-        (self.columns_before_mirroring(xs), ys, samples)
+        (self.unmirror_columns(xs), ys, samples)
     }
 
     /// Converts columns of the image as shown to columns before mirroring.
     #[inline(always)]
-    fn columns_before_mirroring(&self, mut xs: [u32; PACKET_SIZE]) -> [u32; PACKET_SIZE] {
+    fn unmirror_columns(&self, mut xs: [u32; PACKET_SIZE]) -> [u32; PACKET_SIZE] {
         if let Some(width) = self.mirrored_width {
             for x in &mut xs {
                 *x = (width - 1).wrapping_sub(*x);
@@ -152,12 +152,12 @@ impl SampleBlock {
         first: u32,
     ) -> ([u32; PACKET_SIZE], [u32; PACKET_SIZE], [u32; PACKET_SIZE]) {
         let [mut xs, mut ys, mut samples] = [[0; PACKET_SIZE]; 3];
-        let (mut x, mut y, mut sample) = self.shown_pixel_and_sample(first);
+        let (mut x, mut y, mut sample) = self.displayed_pixel_and_sample(first);
         if self.samples.end - sample >= PACKET_SIZE as u32 {
             for lane in 0..PACKET_SIZE {
                 samples[lane] = sample + lane as u32;
             }
-            return (self.columns_before_mirroring([x; PACKET_SIZE]), [y; PACKET_SIZE], samples);
+            return (self.unmirror_columns([x; PACKET_SIZE]), [y; PACKET_SIZE], samples);
         }
         if self.pixels.part != PixelSubset::All {
             return self.pixels_and_samples_of_slots(&array::from_fn(|lane| first + lane as u32));
@@ -173,7 +173,7 @@ impl SampleBlock {
                 }
             }
         }
-        (self.columns_before_mirroring(xs), ys, samples)
+        (self.unmirror_columns(xs), ys, samples)
     }
 }
 

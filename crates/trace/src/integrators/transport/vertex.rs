@@ -216,7 +216,7 @@ impl<'a> SurfaceVertex<'a> {
     }
 
     /// Shading normal on the front side: interpolated, then perturbed by the normal or bump map.
-    pub fn perturbed_front_normal(&self, counters: &mut RayCounters) -> Vec3 {
+    pub fn unflipped_perturbed_normal(&self, counters: &mut RayCounters) -> Vec3 {
         let surface = &self.surface;
         let Some(normal_perturbation) = &self.material.normal_perturbation else {
             return surface.shading_normal;
@@ -227,7 +227,7 @@ impl<'a> SurfaceVertex<'a> {
 
     /// The shading normals on the viewer's side.
     pub fn perturbed_and_smooth_normals(&self, counters: &mut RayCounters) -> PerturbedAndSmoothNormals {
-        let normal = self.perturbed_front_normal(counters) * self.side;
+        let normal = self.unflipped_perturbed_normal(counters) * self.side;
         let smooth_normal = self.surface.shading_normal * self.side;
         let shading_normal_cosine = (smooth_normal != normal).then(|| smooth_normal.dot(normal));
         PerturbedAndSmoothNormals { normal, smooth_normal, shading_normal_cosine }

@@ -178,7 +178,7 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
             if vertex.material.bsdf.has_non_specular_transmission() && tile.world.has_glass() {
                 // The path may be inside glass that touches the surface.
                 let crossing =
-                    tile.find_interface_crossing(path, &vertex, &hit, stepper.coincident_surface_buffers());
+                    tile.interface_crossing_at_hit(path, &vertex, &hit, stepper.coincident_surface_buffers());
                 if let Some([_, near]) = crossing.before {
                     path.interiors = near;
                 }
@@ -194,7 +194,7 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
         }
         // At glass, find all coincident surfaces.
         let InterfaceCrossing { sides, before, far, opaque } =
-            tile.find_interface_crossing(path, &vertex, &hit, stepper.coincident_surface_buffers());
+            tile.interface_crossing_at_hit(path, &vertex, &hit, stepper.coincident_surface_buffers());
         let arrived = before.as_ref().map_or(&path.interiors, |[arrived, _]| arrived);
         path.throughput *= medium_transmittance(tile.world, arrived, hit.shape.t);
         if let Some([_, near]) = before {
@@ -210,7 +210,7 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
                 let reached = Interaction::Opaque(&vertex, OpaqueSurfaceHit::Touching(touched), &far);
                 return stepper.handle_interaction(path, reached, has_passed);
             }
-            path.path = path.continuation_path_number(PASSED);
+            path.path = path.child_path_number(PASSED);
         }
         // Stop at a boundary between media with different indices of refraction, and at glass that emits.
         let near = &path.interiors;
@@ -251,8 +251,7 @@ fn rough_dielectric_point<'a, W: PathStepper<'a>>(
     let tile = stepper.tile_context();
     let interior_lists = [&path.interiors, far];
     let indices = interior_lists.map(|interiors| medium_ior(tile.world, interiors));
-    let boundary =
-        tile.separating_glass_surface(hit, interior_lists, stepper.coincident_surface_buffers())?;
+    let boundary = tile.glass_interface_at_hit(hit, interior_lists, stepper.coincident_surface_buffers())?;
     let glass = tile.world.materials[boundary.material as usize].bsdf.as_dielectric()?;
     let touching = boundary.hit.filter(|_| glass.roughness.texture().is_some());
     let touching =
@@ -272,7 +271,7 @@ fn null_interaction_outcome<'a, W: PathStepper<'a>>(
     vertex: &SurfaceVertex<'a>,
     (way, hit): (SegmentFromLastVertex, Hit),
 ) -> NullInteractionOutcome {
-    if !stochastic_opacity_test(stepper.tile_context(), path, vertex, stepper.texture_lookup_counter()) {
+    if !is_stochastically_opaque(stepper.tile_context(), path, vertex, stepper.texture_lookup_counter()) {
         return NullInteractionOutcome::Passed(Vec3::ONE);
     }
     let Some(pane) = vertex.material.bsdf.as_thin_dielectric() else { return NullInteractionOutcome::Opaque };
@@ -292,7 +291,7 @@ fn is_stopped_by_coincident_surface<'a, W: PathStepper<'a>>(
     vertex: &SurfaceVertex<'a>,
 ) -> bool {
     vertex.material.bsdf.as_thin_dielectric().is_none()
-        && stochastic_opacity_test(stepper.tile_context(), path, vertex, stepper.texture_lookup_counter())
+        && is_stochastically_opaque(stepper.tile_context(), path, vertex, stepper.texture_lookup_counter())
 }
 
 /// Opacity of the surface at a vertex. If light samples compete with the path, the texture is looked up
@@ -305,7 +304,7 @@ pub fn opacity_at_path_vertex(path: &PathRay, vertex: &SurfaceVertex<'_>, lookup
 }
 
 /// Randomly decides whether the surface is opaque at this vertex, with a probability equal to its opacity.
-fn stochastic_opacity_test(
+fn is_stochastically_opaque(
     tile: &TileContext<'_>,
     path: &PathRay,
     vertex: &SurfaceVertex<'_>,
@@ -320,7 +319,7 @@ fn path_past_surface(path: PathRay, vertex: &SurfaceVertex<'_>, part: Vec3) -> P
     PathRay {
         ray: vertex.spawn_ray(path.ray.direction),
         throughput: path.throughput * part,
-        path: path.continuation_path_number(PASSED),
+        path: path.child_path_number(PASSED),
         state: path.state.after_null_interaction(part.max_element()),
         cone: vertex.cone,
         ..path
@@ -339,7 +338,7 @@ impl TileContext<'_> {
         let (mut path, mut hit) = (*path, *hit);
         for _ in 0..=MAX_NULL_INTERACTIONS {
             let vertex = SurfaceVertex::from_hit_with_needed_attributes(self, &path, &hit);
-            if stochastic_opacity_test(self, &path, &vertex, &mut counters.texture_lookups) {
+            if is_stochastically_opaque(self, &path, &vertex, &mut counters.texture_lookups) {
                 return Some((path, hit));
             }
             path = path_past_surface(path, &vertex, Vec3::ONE);

@@ -1,6 +1,6 @@
 //! Open rims that end at opaque surfaces, where light can reach the other side only through the glass.
 
-use super::parts::{GlassTriangles, OpenGlassParts, RimEdge, all_or_some_triangles_are_glass};
+use super::parts::{GlassTriangleSelection, OpenGlassParts, RimEdge, all_or_some_triangles_are_glass};
 use crate::accel::Bvh;
 use crate::assets::LoadedMesh;
 use crate::control::{CancelToken, Canceled};
@@ -132,7 +132,7 @@ fn evaluate_opaque_surface_queries(
     let tree = Bvh::build(&bounds, token)?;
     let mut answers = vec![false; queries.len()];
     for object in &scene.objects {
-        if all_or_some_triangles_are_glass(scene, meshes, object) == Some(GlassTriangles::All) {
+        if all_or_some_triangles_are_glass(scene, meshes, object) == Some(GlassTriangleSelection::All) {
             continue;
         }
         token.check_pause_and_cancel()?;

@@ -100,8 +100,8 @@ impl GlassSolids {
         let alone = |place| ObjectRoleInSolid { place, is_inside_out: false, is_open: false };
         solids.parts = (0..scene.objects.len() as u32).map(alone).collect();
         let all = groups.parts_by_solid();
-        let holes = SolidHole::find_per_solid(&parts, &groups, &all, &shared_edges);
-        let covered = covered_flag_per_hole(scene, meshes, &parts, &holes, token)?;
+        let holes = SurfaceGap::find_per_solid(&parts, &groups, &all, &shared_edges);
+        let covered = opaque_cover_flag_per_hole(scene, meshes, &parts, &holes, token)?;
         let mut closed: Vec<ClosedSolid> = Vec::new();
         for ((members, hole), &is_covered) in all.iter().zip(&holes).zip(&covered) {
             let is_open = hole.part > SMALL_HOLE && !is_covered;
@@ -180,18 +180,18 @@ impl GlassSolids {
 }
 
 /// Whether opaque surfaces surround each hole.
-fn covered_flag_per_hole(
+fn opaque_cover_flag_per_hole(
     scene: &Scene,
     meshes: &[&LoadedMesh],
     parts: &OpenGlassParts,
-    holes: &[SolidHole],
+    holes: &[SurfaceGap],
     token: &CancelToken,
 ) -> Result<Vec<bool>, Canceled> {
-    let is_large = |hole: &&SolidHole| hole.part > SMALL_HOLE;
+    let is_large = |hole: &&SurfaceGap| hole.part > SMALL_HOLE;
     let rims: Vec<&[RimEdge]> = holes.iter().filter(is_large).map(|hole| &*hole.rims).collect();
     let mut parts = caps::covered_rim_fractions(scene, meshes, parts, &rims, token)?.into_iter();
     let is_covered =
-        |hole: &SolidHole| is_large(&hole) && parts.next().is_some_and(|part| part >= MIN_COVERED_FRACTION);
+        |hole: &SurfaceGap| is_large(&hole) && parts.next().is_some_and(|part| part >= MIN_COVERED_FRACTION);
     Ok(holes.iter().map(is_covered).collect())
 }
 
@@ -251,7 +251,7 @@ impl PartGroups {
     }
 
     /// Volume and area of a solid, with all parts oriented like the first part.
-    fn volume_and_area(&self, parts: &OpenGlassParts, members: &[u32]) -> (f64, f64) {
+    fn solid_volume_and_area(&self, parts: &OpenGlassParts, members: &[u32]) -> (f64, f64) {
         let (mut volume, mut area) = (0.0, 0.0);
         for &part in members {
             let OpenGlassPart { volume: own, area: surface, .. } = &parts.list[part as usize];
@@ -263,7 +263,7 @@ impl PartGroups {
 
     /// Whether the parts of a closed solid enclose no volume.
     fn have_zero_volume(&self, parts: &OpenGlassParts, members: &[u32]) -> bool {
-        let (volume, area) = self.volume_and_area(parts, members);
+        let (volume, area) = self.solid_volume_and_area(parts, members);
         volume.abs() <= NO_VOLUME * area * area.sqrt()
     }
 
@@ -280,7 +280,7 @@ impl PartGroups {
             objects.iter().all(|&object| scene.objects[object as usize].shape.as_mesh().is_some());
         let do_agree = members.iter().all(|&part| !self.flips[part as usize]);
         let substance = parts.list[members[0] as usize].substance;
-        let (volume, _) = self.volume_and_area(parts, members);
+        let (volume, _) = self.solid_volume_and_area(parts, members);
         (are_meshes && do_agree).then_some(ClosedSolid { objects, volume, substance })
     }
 
@@ -299,7 +299,7 @@ impl PartGroups {
     fn is_first_part_inside_out(&self, parts: &OpenGlassParts, members: &[u32], is_closed: bool) -> bool {
         if is_closed {
             // Smaller volumes are attributed to rounding.
-            let (volume, area) = self.volume_and_area(parts, members);
+            let (volume, area) = self.solid_volume_and_area(parts, members);
             return volume < -1e-9 * area * area.sqrt();
         }
         let own = members.iter().map(|&part| (&parts.list[part as usize], self.flips[part as usize]));
@@ -309,7 +309,7 @@ impl PartGroups {
 }
 
 /// Missing part of a solid's surface.
-struct SolidHole {
+struct SurfaceGap {
     rims: Vec<RimEdge>,
     /// For each edge, whether another edge of the solid coincides with it and has the same direction.
     disagree: Vec<bool>,
@@ -317,7 +317,7 @@ struct SolidHole {
     part: f64,
 }
 
-impl SolidHole {
+impl SurfaceGap {
     /// Returns the holes of all solids.
     fn find_per_solid(
         parts: &OpenGlassParts,

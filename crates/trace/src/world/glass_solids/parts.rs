@@ -191,15 +191,15 @@ impl OpenGlassParts {
         object: u32,
         placed: &MeshReference,
         loaded: &LoadedMesh,
-        glass: GlassTriangles,
+        glass: GlassTriangleSelection,
         open: &[[u32; 2]],
     ) {
         let mesh = &loaded.mesh;
         let place = placed.placed.to_transform().relative_to_origins(mesh.origin, self.origin);
         let mirrors = place.flips_handedness();
         let is_glass = |triangle: usize| match glass {
-            GlassTriangles::All => true,
-            GlassTriangles::Some => mesh
+            GlassTriangleSelection::All => true,
+            GlassTriangleSelection::Some => mesh
                 .materials
                 .get(triangle)
                 .is_some_and(|&own| loaded.materials.get(own as usize).is_some_and(FileMaterial::is_glass)),
@@ -245,7 +245,7 @@ fn point_on_or_inside_shape(shape: &Shape, meshes: &[&LoadedMesh]) -> DVec3 {
 
 /// Which of an object's triangles are glass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum GlassTriangles {
+pub(super) enum GlassTriangleSelection {
     /// All triangles, or the whole object if it is not a mesh.
     All,
     /// Triangles whose material in the mesh file is glass.
@@ -257,12 +257,16 @@ pub(super) fn all_or_some_triangles_are_glass(
     scene: &Scene,
     meshes: &[&LoadedMesh],
     object: &Object,
-) -> Option<GlassTriangles> {
+) -> Option<GlassTriangleSelection> {
     match (object.material, object.shape.as_mesh()) {
-        (Some(index), _) => scene.materials[index].kind.is_solid_glass().then_some(GlassTriangles::All),
-        (None, Some(mesh)) => {
-            meshes[mesh.file].materials.iter().any(FileMaterial::is_glass).then_some(GlassTriangles::Some)
+        (Some(index), _) => {
+            scene.materials[index].kind.is_solid_glass().then_some(GlassTriangleSelection::All)
         }
+        (None, Some(mesh)) => meshes[mesh.file]
+            .materials
+            .iter()
+            .any(FileMaterial::is_glass)
+            .then_some(GlassTriangleSelection::Some),
         (None, None) => None,
     }
 }

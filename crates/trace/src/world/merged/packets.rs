@@ -69,13 +69,15 @@ impl MergedMeshes {
         (active, ends): (u32, &F32x16),
         except: Option<&[u32; PACKET_SIZE]>,
     ) -> u32 {
-        let Some(facets) = &self.facets else { return self.any_hit_by_tree(rows, active, ends, except) };
+        let Some(facets) = &self.facets else {
+            return self.any_hit_packet_with_tree(rows, active, ends, except);
+        };
         let own = except.unwrap_or(&[Self::NO_TRIANGLE; PACKET_SIZE]);
         let size = self.bounds().extent();
         match by.run(AnyHitIfIncoherentKernel { facets, size, rows, active, ends, except: own }) {
             Some([hit, 0]) => hit,
             Some([hit, undecided]) => hit | self.any_hit_one_by_one(rows, undecided, ends, own),
-            None => self.any_hit_by_tree(rows, active, ends, except),
+            None => self.any_hit_packet_with_tree(rows, active, ends, except),
         }
     }
 
@@ -97,7 +99,7 @@ impl MergedMeshes {
     }
 
     #[inline(never)]
-    fn any_hit_by_tree(
+    fn any_hit_packet_with_tree(
         &self,
         rows: &RayPacket,
         active: u32,

@@ -4,7 +4,7 @@ use super::*;
 use crate::assets::LoadedMesh;
 use crate::geometry::mesh::TriangleMesh;
 use crate::geometry::ray::offset_origin;
-use crate::lights::LightSceneGeometry;
+use crate::lights::GeometryOfLight;
 use crate::math::DVec3;
 use crate::math::random::signed_number_generator as random;
 use crate::math::transform::Transform;
@@ -103,16 +103,16 @@ fn merged_and_unmerged_hits_are_equal() {
         let nothing = Hit { shape: ShapeHit::from_t(0.0), object: 3 };
         let Hit { shape, object } = found.unwrap_or(nothing);
         for source in [
-            LightSceneGeometry::Nothing,
-            LightSceneGeometry::Object(object),
-            LightSceneGeometry::Primitive(object, shape.primitive),
+            GeometryOfLight::Nothing,
+            GeometryOfLight::Object(object),
+            GeometryOfLight::Primitive(object, shape.primitive),
         ] {
             let any = (0_u32..).zip(&alone).any(|(id, own)| match source {
-                LightSceneGeometry::Nothing => own.any_hit(&ray, &ray.to_f64(), None),
-                LightSceneGeometry::Object(except) | LightSceneGeometry::SeeThrough(except) => {
+                GeometryOfLight::Nothing => own.any_hit(&ray, &ray.to_f64(), None),
+                GeometryOfLight::Object(except) | GeometryOfLight::SeeThrough(except) => {
                     id != except && own.any_hit(&ray, &ray.to_f64(), None)
                 }
-                LightSceneGeometry::Primitive(of, part) => {
+                GeometryOfLight::Primitive(of, part) => {
                     own.any_hit(&ray, &ray.to_f64(), (id == of).then_some(part))
                 }
             });

@@ -2,7 +2,7 @@
 
 use super::super::candidates::PartColorCandidates;
 use super::super::cell::{ForegroundParts, TwoPartColorCell};
-use super::super::cost_model::RateDistortion;
+use super::super::cost_model::RateDistortionParameters;
 use super::super::terminal_color::{ColorLayer, TerminalColor};
 use super::beam::{CursorDistance, RowPrefixPlan, SearchBeam, color_pair_key};
 use crate::mosaic::{PLACES, TwoPartBlockPattern};
@@ -20,7 +20,7 @@ struct ColorChange {
 /// Color changes to try for a cell.
 pub(super) struct ColorChangesToTry {
     mosaic: TwoPartColorCell,
-    model: RateDistortion,
+    model: RateDistortionParameters,
     all: Vec<ColorChange>,
     /// End index of the colors for the first part. Colors for the second part follow, up to `second`.
     first: usize,
@@ -31,7 +31,7 @@ impl ColorChangesToTry {
     pub(super) fn new(
         candidates: &PartColorCandidates,
         mosaic: TwoPartColorCell,
-        model: RateDistortion,
+        model: RateDistortionParameters,
     ) -> Self {
         let PartColorCandidates { first, second, both } = candidates;
         let mut changes =

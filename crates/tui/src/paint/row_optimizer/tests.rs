@@ -26,7 +26,7 @@ fn pen_changes_once_and_blanks_are_preferred() {
     let found = plan_row(
         &wanted(&[[RED, RED], [RED, RED], [BLACK, RED]]),
         start(BLACK, TerminalColor::DefaultBackground),
-        RateDistortion::EXACT,
+        RateDistortionParameters::EXACT,
     );
     let glyphs: Vec<ForegroundParts> = found.ops.iter().map(|op| op.glyph).collect();
     assert_eq!(glyphs, [ForegroundParts::Blank, ForegroundParts::Blank, ForegroundParts::First]);
@@ -40,12 +40,13 @@ fn unchanged_cells_are_skipped() {
     for target in &mut targets[1..8] {
         target.shown = Some(TwoPartColorCell::from_halves([RED, TerminalColor::Rgb([1, 1, 1])]));
     }
-    let found = plan_row(&targets, start(RED, BLACK), RateDistortion::EXACT);
+    let found = plan_row(&targets, start(RED, BLACK), RateDistortionParameters::EXACT);
     let columns: Vec<usize> = found.ops.iter().map(|op| op.column).collect();
     assert_eq!((columns, found.bytes), (vec![0, 8], 3 + 4 + 3));
     // A one-cell gap is redrawn, because this takes no more bytes than moving the cursor and is more
     // accurate.
-    let found = plan_row(&[targets[0], targets[1], targets[8]], start(RED, BLACK), RateDistortion::EXACT);
+    let found =
+        plan_row(&[targets[0], targets[1], targets[8]], start(RED, BLACK), RateDistortionParameters::EXACT);
     assert_eq!((found.ops.len(), found.bytes), (3, 9));
 }
 
@@ -59,7 +60,7 @@ fn default_colors_are_drawn_in_their_layers() {
     ] {
         let targets =
             [WantedAndShownCell { wanted: Some(TwoPartColorCell::from_halves(halves)), shown: None }];
-        let found = plan_row(&targets, start(BLACK, BLACK), RateDistortion::MOVING);
+        let found = plan_row(&targets, start(BLACK, BLACK), RateDistortionParameters::MOVING);
         assert_eq!(found.ops.first().map(|op| op.mosaic.pair), Some(halves));
     }
 }
@@ -96,7 +97,7 @@ proptest! {
         is_exact in any::<bool>(),
     ) {
         let targets: Vec<WantedAndShownCell> = cells.iter().map(|(wanted, shown)| WantedAndShownCell { wanted: *wanted, shown: *shown }).collect();
-        let model = if is_exact { RateDistortion::EXACT } else { RateDistortion::MOVING };
+        let model = if is_exact { RateDistortionParameters::EXACT } else { RateDistortionParameters::MOVING };
         let found = plan_row(&targets, start(TerminalColor::DefaultForeground, TerminalColor::DefaultBackground), model);
         let mut screen: Vec<Option<TwoPartColorCell>> = targets.iter().map(|target| target.shown).collect();
         for op in &found.ops {
@@ -107,13 +108,13 @@ proptest! {
         for (shown, target) in screen.iter().zip(&targets) {
             let Some(wanted) = target.wanted else { continue };
             let shown = shown.expect("unknown cells should be drawn");
-            for (shown, wanted, part) in shown.overlapping_color_pairs(wanted) {
+            for (shown, wanted, part) in shown.color_overlaps_with(wanted) {
                 let error = model.squared_color_error(shown, wanted);
                 if is_exact {
                     prop_assert!(error <= 3.0, "a channel differs by more than 1");
                 } else {
                     // Larger errors in a single channel should be avoided at any cost.
-                    prop_assert!(part * error <= RateDistortion::MOVING.byte * 120.0);
+                    prop_assert!(part * error <= RateDistortionParameters::MOVING.byte * 120.0);
                 }
             }
         }

@@ -2,7 +2,7 @@
 
 use super::super::diagnostics::{clear_blocking_errors, set_warnings, show_errors};
 use super::super::history;
-use super::super::written_files::set_written_image_descriptions;
+use super::super::written_files::describe_files_of_request;
 use super::record_stage;
 use crate::messages;
 use crate::pipeline::protocol::{
@@ -34,7 +34,7 @@ pub(super) fn handle_done(
         state.saving.own = SceneImageProgress { state: SavedSceneRenderStatus::Written, fraction: 1.0 };
     }
     complete_noise_curve(state, &report, unchanged);
-    set_written_image_descriptions(state, state.request.generation, &report);
+    describe_files_of_request(state, state.request.generation, &report);
     state.work.report = Some(report);
     state.work.unchanged = unchanged;
     set_warnings(state, warnings);
@@ -63,7 +63,7 @@ fn add_seconds_of_earlier_requests(report: &mut Report) {
 fn count_finished_render(state: &mut State, unchanged: bool) {
     let is_counted = std::mem::replace(&mut state.work.is_counted, true);
     let is_new = !unchanged && !is_counted || state.work.renders == 0;
-    let is_shown = state.preview.history.is_newest_from_request(state.request.generation);
+    let is_shown = state.preview.history.newest_is_from_request(state.request.generation);
     if is_new || is_shown && state.preview.history.is_newest_unfinished() {
         state.work.renders += 1;
         if is_shown {

@@ -88,7 +88,7 @@ fn image_errors_include_the_image_index() {
     let container = folder.open("a.gltf", json.to_string().as_bytes()).expect("read");
     let token = CancelToken::new();
     let check = |number, part: &str| {
-        let (_, reason) = rejection(container.check_image_decodes(number, &token));
+        let (_, reason) = expect_rejection(container.check_image_decodes(number, &token));
         assert!(reason.starts_with(&format!("images[{number}]: ")) && reason.contains(part), "{reason}");
         assert!(!reason.contains("ChunkType"), "{reason}");
     };
@@ -114,8 +114,8 @@ fn truncated_and_invalid_glbs_are_rejected() {
     }
     let mut old = complete;
     old[4] = 1;
-    assert_eq!(rejection(folder.open("a.glb", &old)).1, unsupported_glb_message(1));
-    assert_eq!(rejection(folder.open("a.glb", b"PK\x03\x04")).1, NEITHER_GLB_NOR_JSON);
+    assert_eq!(expect_rejection(folder.open("a.glb", &old)).1, unsupported_glb_message(1));
+    assert_eq!(expect_rejection(folder.open("a.glb", b"PK\x03\x04")).1, NEITHER_GLB_NOR_JSON);
 }
 
 proptest! {
@@ -198,7 +198,7 @@ fn newer_versions_are_rejected() {
             Err(error) => {
                 assert!(!is_read, "{asset}: {error}");
                 let required = asset["minVersion"].as_str().expect("text");
-                assert_eq!(rejection(Err::<(), _>(error)).1, newer_version_required_message(required));
+                assert_eq!(expect_rejection(Err::<(), _>(error)).1, newer_version_required_message(required));
             }
         }
     }

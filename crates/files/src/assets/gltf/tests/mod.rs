@@ -10,7 +10,7 @@ use super::accessor::{too_many_viewless_elements_message, view_too_short_message
 use super::container::*;
 use super::model::UNKNOWN_CAMERA;
 use super::*;
-use crate::assets::{LoadedMesh, rejection};
+use crate::assets::{LoadedMesh, expect_rejection};
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::system::file::FileStamp;
 
@@ -52,7 +52,7 @@ fn error(json: &Value) -> String {
         scene(&container)?;
         part(&container, 0).map(drop)
     };
-    rejection(all()).1
+    expect_rejection(all()).1
 }
 
 /// Buffer for a square: four positions, six indices and four texture coordinates.
@@ -413,7 +413,10 @@ fn errors_include_their_location() {
     let mut external = square();
     external["buffers"][0]["uri"] = json!("none.bin");
     let missing = crate::system::describe_error(&std::io::Error::from_raw_os_error(nix::libc::ENOENT));
-    assert_eq!(rejection(open_json(&external)).1, unreadable_buffer_file_message(&missing, 0, "a.gltf"));
+    assert_eq!(
+        expect_rejection(open_json(&external)).1,
+        unreadable_buffer_file_message(&missing, 0, "a.gltf")
+    );
     let zeros = json!({"componentType": 5126, "count": 4_000_000_000_u32, "type": "VEC3"});
     let found = with(&|json| json["accessors"][0] = zeros.clone());
     assert!(found.ends_with(&too_many_viewless_elements_message(4_000_000_000)), "{found}");

@@ -14,7 +14,7 @@ use crate::math::Vec3;
 use crate::math::color::srgb_to_linear;
 
 /// Converts an image to alpha-weighted texels, or to plain texels if it is opaque.
-pub(super) fn alpha_weighted_texels(
+pub(super) fn texels_with_alpha(
     image: DynamicImage,
     curve: ColorTransferFunction,
     metadata: &ImageColorMetadata,
@@ -22,7 +22,7 @@ pub(super) fn alpha_weighted_texels(
     let Some(alpha) =
         alpha_sample_index(&image, metadata).filter(|alpha| !is_channel_filled_with(&image, *alpha, 1.0))
     else {
-        return super::texels(image, curve.encoding_without_alpha(), metadata);
+        return super::texels(image, curve.encoding_of_opaque_image(), metadata);
     };
     let (width, height) = (image.width(), image.height());
     let space = ColorEncoding::CutOut(curve).color_space(metadata);
@@ -96,8 +96,8 @@ fn premultiplied_floats<T: Sample>(
 ) -> TexelData {
     let decoding = options.linearization::<T>();
     let texel = |pixel: &[T]| {
-        let alpha = sanitize(pixel[options.alpha].to_float_scaling_integers()).min(1.0);
-        let encoded = pixel_rgb(pixel).map(T::to_float_scaling_integers);
+        let alpha = sanitize(pixel[options.alpha].to_normalized_f32()).min(1.0);
+        let encoded = pixel_rgb(pixel).map(T::to_normalized_f32);
         *unusable += u64::from(encoded.map(sanitize) != encoded);
         let divisor = if options.is_premultiplied && alpha > 0.0 { alpha } else { 1.0 };
         let linear = match &decoding {

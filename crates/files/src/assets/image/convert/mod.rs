@@ -41,7 +41,7 @@ use with_samples;
 /// Sample type of an image.
 trait Sample: Copy + PartialEq {
     /// Converts the sample to a float. The largest integer becomes 1.
-    fn to_float_scaling_integers(self) -> f32;
+    fn to_normalized_f32(self) -> f32;
 
     /// Tables that map every integer to its linear value, or `None` for floats, which are already linear.
     fn linearization_tables(_: &ColorSpace) -> Option<[Vec<f32>; 3]> {
@@ -55,7 +55,7 @@ trait Sample: Copy + PartialEq {
 }
 
 impl Sample for u8 {
-    fn to_float_scaling_integers(self) -> f32 {
+    fn to_normalized_f32(self) -> f32 {
         f32::from(self) / f32::from(Self::MAX)
     }
 
@@ -69,7 +69,7 @@ impl Sample for u8 {
 }
 
 impl Sample for u16 {
-    fn to_float_scaling_integers(self) -> f32 {
+    fn to_normalized_f32(self) -> f32 {
         f32::from(self) / f32::from(Self::MAX)
     }
 
@@ -83,7 +83,7 @@ impl Sample for u16 {
 }
 
 impl Sample for f32 {
-    fn to_float_scaling_integers(self) -> f32 {
+    fn to_normalized_f32(self) -> f32 {
         self
     }
 }
@@ -109,15 +109,10 @@ fn alpha_sample_index(image: &DynamicImage, metadata: &ImageColorMetadata) -> Op
 
 /// Whether channel `index` equals `value` in every pixel.
 fn is_channel_filled_with(image: &DynamicImage, index: usize, value: f32) -> bool {
-    fn are_channel_samples_equal_to<T: Sample>(
-        samples: &[T],
-        channels: usize,
-        index: usize,
-        value: f32,
-    ) -> bool {
-        samples.chunks_exact(channels).all(|pixel| pixel[index].to_float_scaling_integers() == value)
+    fn channel_has_only_value<T: Sample>(samples: &[T], channels: usize, index: usize, value: f32) -> bool {
+        samples.chunks_exact(channels).all(|pixel| pixel[index].to_normalized_f32() == value)
     }
-    with_samples!(image, samples => are_channel_samples_equal_to(samples, channel_count(image), index, value))
+    with_samples!(image, samples => channel_has_only_value(samples, channel_count(image), index, value))
 }
 
 /// Returns the warning, if any, about an opacity read from an alpha channel that is constant or not decoded.
@@ -172,7 +167,7 @@ pub(super) fn texels(image: DynamicImage, encoding: ColorEncoding, metadata: &Im
         ColorEncoding::Number { of, is_srgb } => {
             return scalars::scalar_texels(&image, of, is_srgb, metadata);
         }
-        ColorEncoding::CutOut(curve) => return cutout::alpha_weighted_texels(image, curve, metadata),
+        ColorEncoding::CutOut(curve) => return cutout::texels_with_alpha(image, curve, metadata),
         ColorEncoding::Color | ColorEncoding::Srgb | ColorEncoding::Linear | ColorEncoding::Raw => {}
     }
     let (width, height) = (image.width(), image.height());
@@ -290,7 +285,7 @@ fn apply_transfer_curves_to_pixel<T: Sample>(pixel: &[T], tables: Option<&[Vec<f
     let rgb = pixel_rgb(pixel);
     match tables {
         Some(tables) => std::array::from_fn(|i| tables[i][rgb[i].table_index()]),
-        None => rgb.map(T::to_float_scaling_integers),
+        None => rgb.map(T::to_normalized_f32),
     }
 }
 

@@ -106,7 +106,7 @@ fn count_unusable_pixels<T: Sample>(pixels: &[T], channels: usize, samples: Scal
     let is_broken = |pixel: &&[T]| {
         !pixel[used.clone()]
             .iter()
-            .all(|value| sanitize(value.to_float_scaling_integers()) == value.to_float_scaling_integers())
+            .all(|value| sanitize(value.to_normalized_f32()) == value.to_normalized_f32())
     };
     pixels.chunks_exact(channels).filter(is_broken).count() as u64
 }
@@ -126,7 +126,7 @@ fn scalar_texels_from_samples<T: Sample>(
     is_srgb: bool,
 ) -> TexelData {
     let decoded = |sample: T, is_srgb: bool| {
-        let value = sanitize(sample.to_float_scaling_integers());
+        let value = sanitize(sample.to_normalized_f32());
         if is_srgb { srgb_to_linear(value) } else { value }
     };
     let number = |pixel: &[T]| match samples {

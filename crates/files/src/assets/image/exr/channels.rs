@@ -129,19 +129,19 @@ pub(super) fn choose_channels(headers: &[Header]) -> Option<ChosenChannels> {
         find(true, LayerChannels::rgb_channels)
             .or_else(|| find(true, LayerChannels::gray_or_luminance_chroma))
     };
-    unnamed.or_else(named).or_else(|| gray_from_single_channel_part(headers))
+    unnamed.or_else(named).or_else(|| choose_lone_channel_as_gray(headers))
 }
 
 /// Returns a part's layers, keyed by name. A layer name is the part of a channel name before its last dot.
 fn layers_by_name(part: usize, header: &Header) -> LayerMap {
     let mut layers = LayerMap::new();
     if !header.deep {
-        add_channels(part, header, &mut layers);
+        add_part_channels_to_layers(part, header, &mut layers);
     }
     layers
 }
 
-fn add_channels(part: usize, header: &Header, layers: &mut LayerMap) {
+fn add_part_channels_to_layers(part: usize, header: &Header, layers: &mut LayerMap) {
     for (channel, description) in header.channels.list.iter().enumerate() {
         let name = description.name.to_string();
         let (layer, name) = name.rsplit_once('.').unwrap_or(("", &name));
@@ -153,7 +153,7 @@ fn add_channels(part: usize, header: &Header, layers: &mut LayerMap) {
 fn layers_across_parts(headers: &[Header]) -> LayerMap {
     let mut layers = LayerMap::new();
     for (part, header) in single_channel_parts(headers) {
-        add_channels(part, header, &mut layers);
+        add_part_channels_to_layers(part, header, &mut layers);
     }
     layers
 }
@@ -166,7 +166,7 @@ fn single_channel_parts(headers: &[Header]) -> impl Iterator<Item = (usize, &Hea
 
 /// Returns the channel of the first single-channel part, or `None` if the single-channel parts are components
 /// of a color or vector.
-fn gray_from_single_channel_part(headers: &[Header]) -> Option<ChosenChannels> {
+fn choose_lone_channel_as_gray(headers: &[Header]) -> Option<ChosenChannels> {
     const COMPONENTS: [&str; 7] = ["R", "G", "B", "RY", "BY", "X", "Y"];
     let is_component = |header: &Header| {
         let name = header.channels.list[0].name.to_string().to_ascii_uppercase();

@@ -5,7 +5,7 @@ use ::exr::meta::header::Header;
 use ::exr::prelude::Vec2;
 
 use super::channels::PartAndChannelIndex;
-use super::{ChannelRow, SAMPLE_BYTES, channel_description};
+use super::{ChannelRow, SAMPLE_BYTES, channel_by_index};
 use crate::math::DVec3;
 
 /// Interpolation weights for the samples on either side of a pixel, from nearest to farthest
@@ -27,7 +27,7 @@ pub(super) struct LuminanceChromaPlanes {
 impl LuminanceChromaPlanes {
     pub(super) fn new(headers: &[Header], channels: [PartAndChannelIndex; 3]) -> Self {
         let [_, ry, _] = channels;
-        let (size, step) = (headers[ry.part].layer_size, channel_description(headers, ry).sampling);
+        let (size, step) = (headers[ry.part].layer_size, channel_by_index(headers, ry).sampling);
         let chroma = || vec![0.0; (size / step).area()];
         Self { channels, size, step, luminance: vec![0.0; size.area()], chroma: [chroma(), chroma()] }
     }
@@ -35,7 +35,7 @@ impl LuminanceChromaPlanes {
     /// Size in memory of the planes after chroma has been interpolated along rows.
     pub(super) fn memory_bytes(headers: &[Header], [_, ry, _]: [PartAndChannelIndex; 3]) -> u64 {
         let size = headers[ry.part].layer_size;
-        let rows = size.height() / channel_description(headers, ry).sampling.y();
+        let rows = size.height() / channel_by_index(headers, ry).sampling.y();
         let samples = (size.width() as u64).saturating_mul((size.height() + 2 * rows) as u64);
         samples.saturating_mul(SAMPLE_BYTES as u64)
     }
@@ -74,7 +74,7 @@ impl LuminanceChromaPlanes {
         let mut rows = [-1, 0, 1].map(|row| self.rgb_row(row, weights));
         for y in 0..height {
             for x in 0..width {
-                put([x, y], limit_saturation([&rows[0], &rows[1], &rows[2]], x, weights));
+                put([x, y], limit_saturation_to_neighbors([&rows[0], &rows[1], &rows[2]], x, weights));
             }
             rows.rotate_left(1);
             rows[2] = self.rgb_row(y as i64 + 2, weights);
@@ -174,7 +174,11 @@ fn luminance_chroma_to_rgb(luminance: f32, [ry, by]: [f32; 2], weights: DVec3) -
 
 /// Limits a pixel's saturation based on its neighbors' saturation, preserving luminance
 /// (`RgbaYca::fixSaturation`).
-fn limit_saturation([above, row, below]: [&[[f32; 3]]; 3], x: usize, weights: DVec3) -> [f32; 3] {
+fn limit_saturation_to_neighbors(
+    [above, row, below]: [&[[f32; 3]]; 3],
+    x: usize,
+    weights: DVec3,
+) -> [f32; 3] {
     let (left, right) = (x.saturating_sub(1), (x + 1).min(row.len() - 1));
     let corners = [above[left], above[right], below[left], below[right]].map(saturation);
     let mean = (0.25 * corners.iter().sum::<f32>()).min(1.0);

@@ -58,7 +58,7 @@ impl<R: BufRead + Seek> ExrDecoder<R> {
     }
 
     /// Color space, alpha usage and warnings.
-    pub(super) fn metadata(&self) -> ImageColorMetadata {
+    pub(super) fn color_metadata(&self) -> ImageColorMetadata {
         let mut metadata =
             ImageColorMetadata { alpha: AlphaInterpretation::Premultiplied, ..ImageColorMetadata::default() };
         if let Some(primaries) = primaries(self.header()) {
@@ -105,13 +105,13 @@ fn decompressed_block_size(header: &Header) -> u64 {
     pixels.saturating_mul(header.channels.bytes_per_pixel as u64)
 }
 
-fn channel_description(headers: &[Header], channel: PartAndChannelIndex) -> &ChannelDescription {
+fn channel_by_index(headers: &[Header], channel: PartAndChannelIndex) -> &ChannelDescription {
     &headers[channel.part].channels.list[channel.channel]
 }
 
 /// Checks that only the chroma channels are subsampled, and both by the same factors.
 fn check_samplings(headers: &[Header], channels: ChosenChannels) -> Result<(), String> {
-    let sampling = |channel: PartAndChannelIndex| channel_description(headers, channel).sampling;
+    let sampling = |channel: PartAndChannelIndex| channel_by_index(headers, channel).sampling;
     let is_divided = |channel: &PartAndChannelIndex| {
         let (Vec2(x, y), size) = (sampling(*channel), headers[channel.part].layer_size);
         x > 0 && y > 0 && size.width().is_multiple_of(x) && size.height().is_multiple_of(y)
@@ -122,7 +122,7 @@ fn check_samplings(headers: &[Header], channels: ChosenChannels) -> Result<(), S
     match channels.component_channels().into_iter().flatten().find(|channel| sampling(*channel) != Vec2(1, 1))
     {
         Some(channel) => {
-            Err(subsampled_channel_message(&channel_description(headers, channel).name.to_string()))
+            Err(subsampled_channel_message(&channel_by_index(headers, channel).name.to_string()))
         }
         None => match channels.as_luminance_chroma() {
             Some([_, ry, by]) if sampling(ry) != sampling(by) => Err(CHROMA_DIFFERS.to_owned()),
@@ -146,7 +146,7 @@ impl<R: BufRead + Seek> ImageDecoder for ExrDecoder<R> {
         let channels = self.channels;
         let mut decompressor = BlockDecompressor::new(self.reader.meta_data(), &self.samplings);
         let headers = decompressor.headers().to_vec();
-        let mut image = PartialImage {
+        let mut image = BlockAssembler {
             headers: &headers,
             channels,
             planes: channels.as_luminance_chroma().map(|planes| LuminanceChromaPlanes::new(&headers, planes)),
@@ -170,13 +170,13 @@ impl<R: BufRead + Seek> ImageDecoder for ExrDecoder<R> {
 }
 
 /// A partially decoded image.
-struct PartialImage<'a> {
+struct BlockAssembler<'a> {
     headers: &'a [Header],
     channels: ChosenChannels,
     planes: Option<LuminanceChromaPlanes>,
 }
 
-impl PartialImage<'_> {
+impl BlockAssembler<'_> {
     /// Adds the samples from a decompressed block.
     fn add_block(&mut self, block: &UncompressedBlock, samples: &mut [u8]) {
         let part = block.index.layer;

@@ -78,7 +78,7 @@ impl MtlMaterial {
 /// [`AssetError::Unreadable`], or [`AssetError::Malformed`] with the line.
 pub(super) fn load(path: &Path, monitor: Monitor<'_>) -> Result<MtlLibrary, AssetError> {
     let quiet = Monitor { progress: &crate::control::ignore_progress, ..monitor };
-    let bytes = read::read_text(path, FILE_LIMIT, quiet)?;
+    let bytes = read::read_text_bytes(path, FILE_LIMIT, quiet)?;
     let hash = read::hash_bytes(&bytes);
     let bytes = convert_mac_line_ends(strip_byte_order_mark(&bytes));
     let mut library = MtlLibrary { materials: Vec::new(), ignored: Vec::new(), hash };

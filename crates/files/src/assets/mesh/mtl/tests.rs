@@ -11,7 +11,7 @@ use super::statements::{
     unsupported_spectrum_warning,
 };
 use super::*;
-use crate::assets::{FileLine, FileMaterial, FileTexture, PhysicalMaterial, rejection};
+use crate::assets::{FileLine, FileMaterial, FileTexture, PhysicalMaterial, expect_rejection};
 use crate::control::{CancelToken, ignore_progress};
 use crate::materials::{Channel, ChannelSelector};
 use crate::math::{DVec2, Vec2, Vec3};
@@ -52,7 +52,11 @@ fn read(text: &str) -> Result<Vec<FileMaterial>, AssetError> {
 /// Asserts that `text` is rejected on `line` because `expected` is missing after `keyword`.
 #[track_caller]
 fn assert_rejected(text: &str, line: usize, keyword: &str, expected: &str) {
-    assert_eq!(rejection(read(text)), (Some(line), expected_arguments_message(keyword, expected)), "{text}");
+    assert_eq!(
+        expect_rejection(read(text)),
+        (Some(line), expected_arguments_message(keyword, expected)),
+        "{text}"
+    );
 }
 
 #[test]

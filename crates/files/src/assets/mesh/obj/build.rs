@@ -88,12 +88,12 @@ impl VertexBuilder<'_> {
         let next = self.parsed.positions.len() as u32;
         let vertex = *self.vertices.entry((corner, tag)).or_insert(next);
         if vertex == next {
-            self.add_vertex(corner, tag.0);
+            self.push_new_vertex(corner, tag.0);
         }
         vertex
     }
 
-    fn add_vertex(&mut self, corner: CornerIndices, group: u32) {
+    fn push_new_vertex(&mut self, corner: CornerIndices, group: u32) {
         let [position, uv, normal] = corner.map(|index| index as usize);
         let ParsedObj { vertices, uvs, normals, .. } = self.statements;
         let index = self.parsed.positions.len() as u32;

@@ -169,7 +169,7 @@ impl ParsedObj {
             if count == 0 {
                 let line = source
                     .line_number(byte_offset_of_face(source, face_index_of_corner(&self.arities, first)));
-                self.warnings.push(missing_attribute_warning(line, name));
+                self.warnings.push(attribute_not_in_file_warning(line, name));
                 self.corners.iter_mut().for_each(|corner| corner[part] = NONE);
             }
         }
@@ -218,7 +218,7 @@ pub(super) fn invalid_smoothing_warning(line: usize, found: &[u8]) -> String {
     format!("line {line}: {}; ignored", expected_message("a smoothing group or `off`", found))
 }
 
-pub(super) fn missing_attribute_warning(line: usize, attribute: &str) -> String {
+pub(super) fn attribute_not_in_file_warning(line: usize, attribute: &str) -> String {
     format!("line {line}: faces reference {attribute}, but the file has none; the references are ignored")
 }
 

@@ -4,14 +4,14 @@ use super::super::parsed::{alpha_ignored_warning, clamped_color_warning};
 use super::super::text::expected_message;
 use super::missing_uvs::{corners_without_uvs_warning, faces_without_uvs_warning, file_without_uvs_warning};
 use super::statements::{
-    CORNER_FORM, excess_vertex_words_warning, free_form_warning, invalid_smoothing_warning,
-    missing_attribute_warning, out_of_range_message,
+    CORNER_FORM, attribute_not_in_file_warning, excess_vertex_words_warning, free_form_warning,
+    invalid_smoothing_warning, out_of_range_message,
 };
 use super::vertex::{NONFINITE_COLOR, WEIGHT_OR_COLOR, ZERO_WEIGHT};
 use super::words::too_few_numbers_message;
 use super::*;
 use crate::assets::mesh::load;
-use crate::assets::{DroppedFaces, rejection};
+use crate::assets::{DroppedFaces, expect_rejection};
 use crate::control::{CancelToken, ignore_progress};
 use crate::math::{Vec2, Vec3};
 use std::fs;
@@ -29,7 +29,7 @@ fn read(text: &str) -> Result<LoadedMesh, AssetError> {
 }
 
 fn error(text: &str) -> (Option<usize>, String) {
-    rejection(read(text))
+    expect_rejection(read(text))
 }
 
 /// Error for an out-of-range vertex index.
@@ -92,7 +92,7 @@ fn only_malformed_libraries_are_errors() {
     );
     assert!(loaded.material_warnings[0].contains("none.mtl"), "{:?}", loaded.material_warnings);
     let result = read_with(&[("a.obj", text.as_bytes()), ("none.mtl", b"newmtl red\nKd 1 2\n")]);
-    assert_eq!(rejection(result).0, Some(2));
+    assert_eq!(expect_rejection(result).0, Some(2));
 }
 
 #[test]
@@ -521,7 +521,7 @@ fn missing_attributes_are_dropped_with_warning() {
     let loaded = read(&format!("{SQUARE}f 1 2 3\nf 1/1/4 3/2/4 4/3/4\n")).expect("whole");
     assert!(loaded.mesh.uvs.is_empty());
     for what in ["texture coordinates", "normals"] {
-        assert!(loaded.warnings.contains(&missing_attribute_warning(6, what)), "{:?}", loaded.warnings);
+        assert!(loaded.warnings.contains(&attribute_not_in_file_warning(6, what)), "{:?}", loaded.warnings);
     }
 }
 

@@ -14,7 +14,7 @@ const BATCH: u64 = 1 << 13;
 
 /// Vertex columns declared by the header keyword.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct OffVertexColumns {
+struct DeclaredVertexColumns {
     uvs: bool,
     normals: bool,
     colors: bool,
@@ -32,16 +32,16 @@ struct OffReader<'a> {
     source: MeshFileBytes<'a>,
     cursor: Cursor<'a>,
     /// Lines with numbers that the header does not declare.
-    excess: LinesWithIgnoredValues,
+    excess: LineCountAndFirstOffset,
     /// Lines whose color is an index into a colormap.
-    indices: LinesWithIgnoredValues,
+    indices: LineCountAndFirstOffset,
 }
 
 /// Lines to warn about: their number and the byte offset of the first one.
 #[derive(Clone, Copy, Default)]
-struct LinesWithIgnoredValues(u64, usize);
+struct LineCountAndFirstOffset(u64, usize);
 
-impl LinesWithIgnoredValues {
+impl LineCountAndFirstOffset {
     fn add_line_at_offset(&mut self, at: usize) {
         self.1 = if self.0 == 0 { at } else { self.1 };
         self.0 += 1;
@@ -174,11 +174,11 @@ impl OffReader<'_> {
         }
         parsed.warnings.extend(self.excess.warning(&self.source, UNDECLARED));
         parsed.warnings.extend(self.indices.warning(&self.source, COLOR_INDEX));
-        assemble_text_mesh(&self.source, parsed, |face| before_faces.start_of_face(vertices, face))
+        assemble_text_mesh(&self.source, parsed, |face| before_faces.face_byte_offset(vertices, face))
     }
 
     /// Returns the byte offset of a face, given its index. The reader must be at the first face.
-    fn start_of_face(&self, vertices: u64, face: usize) -> Option<usize> {
+    fn face_byte_offset(&self, vertices: u64, face: usize) -> Option<usize> {
         let mut ahead = *self;
         ahead.read_faces(vertices, face as u64, &mut ParsedMesh::default()).ok()?;
         ahead.cursor.skip_to_word_across_lines();
@@ -195,7 +195,7 @@ impl OffReader<'_> {
     }
 
     /// Reads the optional header keyword `[ST][C][N][4]OFF`. A count may follow without whitespace.
-    fn read_header_keyword(&mut self) -> Result<OffVertexColumns, AssetError> {
+    fn read_header_keyword(&mut self) -> Result<DeclaredVertexColumns, AssetError> {
         if !self.cursor.skip_to_word_across_lines() {
             return self.fail(EMPTY_FILE);
         }
@@ -203,7 +203,7 @@ impl OffReader<'_> {
         let word = self.cursor.take_word();
         if word[0].is_ascii_digit() && !word.ends_with(b"OFF") {
             self.cursor = start;
-            return Ok(OffVertexColumns::default());
+            return Ok(DeclaredVertexColumns::default());
         }
         let Some(end) = word.windows(3).position(|part| part == b"OFF") else {
             self.cursor = start;
@@ -217,7 +217,12 @@ impl OffReader<'_> {
         self.cursor = Cursor::new(self.source.bytes, self.cursor.offset() - digits.len());
         self.reject_binary()?;
         let has = |letter| flags.contains(&letter);
-        Ok(OffVertexColumns { uvs: has(b'S'), normals: has(b'N'), colors: has(b'C'), homogeneous: has(b'4') })
+        Ok(DeclaredVertexColumns {
+            uvs: has(b'S'),
+            normals: has(b'N'),
+            colors: has(b'C'),
+            homogeneous: has(b'4'),
+        })
     }
 
     fn reject_binary(&mut self) -> Result<(), AssetError> {
@@ -275,7 +280,7 @@ impl OffReader<'_> {
 
     fn read_vertices(
         &mut self,
-        header: OffVertexColumns,
+        header: DeclaredVertexColumns,
         count: u64,
         parsed: &mut ParsedMesh,
     ) -> Result<(), AssetError> {

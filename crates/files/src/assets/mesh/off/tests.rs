@@ -1,7 +1,7 @@
 use super::super::parsed::clamped_color_warning;
 use super::*;
+use crate::assets::expect_rejection;
 use crate::assets::read::Monitor;
-use crate::assets::rejection;
 use crate::control::{CancelToken, ignore_progress};
 use crate::math::Vec3;
 use std::path::Path;
@@ -13,7 +13,7 @@ fn read(text: &str) -> Result<LoadedMesh, AssetError> {
 }
 
 fn error(text: &str) -> (Option<usize>, String) {
-    rejection(read(text))
+    expect_rejection(read(text))
 }
 
 const FACES: &str = "3 0 1 2\n3 0 2 3\n";

@@ -25,7 +25,7 @@ pub(super) fn parse(source: &MeshFileBytes<'_>) -> Result<LoadedMesh, AssetError
     let header = header::parse(source)?;
     let (bytes, at) = (source.bytes, header.body);
     match header.encoding {
-        Encoding::Ascii => read_text(source, &header),
+        Encoding::Ascii => read_text_bytes(source, &header),
         Encoding::LittleEndian => read(source, &header, &mut BinaryReader::<false> { bytes, at }),
         Encoding::BigEndian => read(source, &header, &mut BinaryReader::<true> { bytes, at }),
     }
@@ -33,7 +33,7 @@ pub(super) fn parse(source: &MeshFileBytes<'_>) -> Result<LoadedMesh, AssetError
 
 /// Reads a text file, ignoring line ends. If this fails or leaves words unread, some lines may contain
 /// undeclared values, so the file is read again with one item per line.
-fn read_text(source: &MeshFileBytes<'_>, header: &PlyHeader) -> Result<LoadedMesh, AssetError> {
+fn read_text_bytes(source: &MeshFileBytes<'_>, header: &PlyHeader) -> Result<LoadedMesh, AssetError> {
     let cursor = Cursor::new(source.bytes, header.body);
     let mut words = AsciiReader(cursor, LineEndMode::Blank);
     let by_words = read(source, header, &mut words);
@@ -46,7 +46,7 @@ fn read_text(source: &MeshFileBytes<'_>, header: &PlyHeader) -> Result<LoadedMes
     match (by_lines, lines.1) {
         (Ok(mut loaded), LineEndMode::EndItems(count, Some(first))) => {
             let line = source.line_number(first);
-            loaded.warnings.push(undeclared_values_warning(line, count));
+            loaded.warnings.push(extra_line_values_warning(line, count));
             Ok(loaded)
         }
         // Return the error from the second pass, because the first pass misreads files with undeclared
@@ -165,7 +165,7 @@ fn implausible_count_message(element: &str, count: u64, remaining: u64) -> Strin
 }
 
 /// Warning about `count` lines with more values than properties.
-fn undeclared_values_warning(first: usize, count: u64) -> String {
+fn extra_line_values_warning(first: usize, count: u64) -> String {
     let lines = match count {
         1 => format!("line {first}"),
         _ => format!("line {first} and {} more", count - 1),

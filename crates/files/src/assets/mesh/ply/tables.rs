@@ -13,25 +13,25 @@ use crate::math::DVec3;
 #[derive(Debug, Default, PartialEq)]
 pub struct PlyTables {
     /// One row per vertex.
-    pub vertices: PropertyTable,
+    pub vertices: PropertyValueTable,
     /// One row per face.
-    pub faces: PropertyTable,
+    pub faces: PropertyValueTable,
     /// Vertex indices, all of which are in range.
     pub triangles: Vec<[u32; 3]>,
 }
 
 /// The scalar properties of an element, row by row.
 #[derive(Debug, Default, PartialEq)]
-pub struct PropertyTable {
+pub struct PropertyValueTable {
     names: Vec<String>,
     /// For each property, whether its numbers are floating-point.
     is_float: Vec<bool>,
     values: Vec<f64>,
 }
 
-impl PropertyTable {
+impl PropertyValueTable {
     /// Returns the columns of properties, or `None` unless the table has all of them.
-    pub fn columns(&self, names: &[&str]) -> Option<Vec<usize>> {
+    pub fn column_indices(&self, names: &[&str]) -> Option<Vec<usize>> {
         names.iter().map(|name| self.names.iter().position(|known| known == name)).collect()
     }
 
@@ -52,7 +52,7 @@ impl PropertyTable {
 
     /// Returns the vectors in three columns, or `None` unless the table has all of them.
     pub fn vectors(&self, names: [&str; 3]) -> Option<Vec<DVec3>> {
-        let columns = self.columns(&names)?;
+        let columns = self.column_indices(&names)?;
         let vector = |row| DVec3::from_array([0, 1, 2].map(|axis| self.value(row, columns[axis])));
         Some((0..self.row_count()).map(vector).collect())
     }
@@ -86,7 +86,7 @@ fn read_elements(
 ) -> Result<PlyTables, String> {
     let mut tables = PlyTables::default();
     for element in elements {
-        let mut table = PropertyTable::default();
+        let mut table = PropertyValueTable::default();
         for property in &element.properties {
             match property.kind {
                 PropertyType::Scalar(scalar) => {
@@ -118,7 +118,7 @@ fn read_elements(
 fn read_item(
     element: &Element,
     numbers: &mut impl NumberReader,
-    table: &mut PropertyTable,
+    table: &mut PropertyValueTable,
     triangles: &mut Vec<[u32; 3]>,
 ) -> Result<(), String> {
     for property in &element.properties {

@@ -1,7 +1,7 @@
 use std::path::Path;
 
 use super::super::parsed::{
-    FACE_COLORS_IGNORED, alpha_ignored_warning, clamped_color_warning, dropped_fractions_warning,
+    FACE_COLORS_IGNORED, alpha_ignored_warning, clamped_color_warning, dropped_color_fractions_warning,
 };
 use super::super::text::expected_message;
 use super::body::END_OF_FILE;
@@ -12,8 +12,8 @@ use super::header::{
     unknown_keyword_message, unknown_type_message,
 };
 use super::*;
+use crate::assets::expect_rejection;
 use crate::assets::read::Monitor;
-use crate::assets::rejection;
 use crate::control::{CancelToken, ignore_progress};
 use crate::math::{Vec2, Vec3};
 
@@ -24,7 +24,7 @@ fn read_bytes(bytes: &[u8]) -> Result<LoadedMesh, AssetError> {
 }
 
 fn error(bytes: &[u8]) -> (Option<usize>, String) {
-    rejection(read_bytes(bytes))
+    expect_rejection(read_bytes(bytes))
 }
 
 /// Error in the first face.
@@ -272,7 +272,7 @@ fn undeclared_values_are_ignored() {
         assert_eq!(read.mesh, plain.mesh, "{body}");
         assert_eq!(read.warnings.len(), 1);
         let line = if body.contains("9 9") { 11 } else { 14 };
-        assert_eq!(read.warnings[0], undeclared_values_warning(line, 2));
+        assert_eq!(read.warnings[0], extra_line_values_warning(line, 2));
     }
     // A truncated file with undeclared values must not be read word by word.
     let rows = "0 0 0 1 2 3\n1 0 0 1 2 3\n1 1 0 1 2 3\n0 1 0 1 2 3\n";
@@ -440,7 +440,7 @@ fn unusable_vertex_colors_are_reported_with_line() {
             [0, 255, 0],
         ),
         ("uchar", ["0 0 0", "0 0 0", "0 0 -5", "0 0 0"], 15, clamped_color_warning(-5.0, 255.0), [0; 3]),
-        ("uchar", ["0 0 0", "0 0.5 0", "0 0 0", "0 0 0"], 14, dropped_fractions_warning(0.5), [0; 3]),
+        ("uchar", ["0 0 0", "0 0.5 0", "0 0 0", "0 0 0"], 14, dropped_color_fractions_warning(0.5), [0; 3]),
         ("float", ["0 0.5 0", "0 1.5 0", "0 0 0", "0 0 0"], 14, clamped_color_warning(1.5, 1.0), [0, 255, 0]),
         ("float", ["0 0 0", "0 -0.5 0", "0 0 0", "0 0 0"], 14, clamped_color_warning(-0.5, 1.0), [0; 3]),
         (

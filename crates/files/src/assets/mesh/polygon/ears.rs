@@ -24,7 +24,7 @@ pub(super) fn clip_ears_and_check_simple(points: &[DVec2], emit: impl FnMut([usi
 
 /// Like [`clip_ears_and_check_simple`], but also returns the number of visits.
 #[cfg(test)]
-pub(super) fn count_visits(points: &[DVec2]) -> (bool, u64) {
+pub(super) fn clip_ears_and_count_visits(points: &[DVec2]) -> (bool, u64) {
     let mut clipper = EarClipper::new(points, |_| {});
     (clipper.run(), clipper.visits)
 }

@@ -49,7 +49,7 @@ fn refined_vertex<T: VertexValue>(topology: &Topology, values: &[T], vertex: u32
     let (mut sum, mut count) = (T::default(), 0);
     let start = topology.vertex_halves[vertex as usize];
     let last = topology.walk_fan(start, |half| {
-        sum = sum + values[topology.end(half) as usize];
+        sum = sum + values[topology.end_vertex(half) as usize];
         count += 1;
     });
     match last {
@@ -58,20 +58,22 @@ fn refined_vertex<T: VertexValue>(topology: &Topology, values: &[T], vertex: u32
             value * (1.0 - f64::from(count) * weight) + sum * weight
         }
         Some(last) => {
-            let ends = values[topology.end(start) as usize] + values[topology.start(last) as usize];
+            let ends =
+                values[topology.end_vertex(start) as usize] + values[topology.start_vertex(last) as usize];
             value * 0.75 + ends * 0.125
         }
     }
 }
 
 fn refined_edge_value<T: VertexValue>(topology: &Topology, values: &[T], half: u32) -> T {
-    let [a, b] = [topology.start(half), topology.end(half)];
+    let [a, b] = [topology.start_vertex(half), topology.end_vertex(half)];
     let at = |vertex: u32| values[vertex as usize];
     let twin = topology.twin(half);
     if twin == NONE {
         return (at(a) + at(b)) * 0.5;
     }
-    let wings = at(topology.start(previous_half_edge(half))) + at(topology.start(previous_half_edge(twin)));
+    let wings = at(topology.start_vertex(previous_half_edge(half)))
+        + at(topology.start_vertex(previous_half_edge(twin)));
     let wide = match (topology.has_wide_fan_at(a), topology.has_wide_fan_at(b)) {
         (true, false) => topology.wide_fan_face_count(half).map(|faces| (a, b, faces)),
         (false, true) => topology.wide_fan_face_count(twin).map(|faces| (b, a, faces)),
@@ -97,7 +99,8 @@ pub(super) fn limit_value<T: VertexValue>(topology: &Topology, refined: &[T], in
     };
     let half = topology.edge_halves[edge];
     if topology.twin(half) == NONE {
-        let ends = refined[topology.start(half) as usize] + refined[topology.end(half) as usize];
+        let ends =
+            refined[topology.start_vertex(half) as usize] + refined[topology.end_vertex(half) as usize];
         return value * (2.0 / 3.0) + ends * (1.0 / 6.0);
     }
     let ring = edge_ring(topology, half).map(|vertex| refined[vertex as usize]);
@@ -133,5 +136,5 @@ pub(super) fn edge_ring(topology: &Topology, half: u32) -> [u32; 6] {
     let middle = |half: u32| first + topology.edge_of_half_edge(half);
     let sides = |half: u32| [middle(next_half_edge(half)), middle(previous_half_edge(half))];
     let ([b, c], [d, e]) = (sides(half), sides(twin));
-    [topology.end(half), b, c, topology.start(half), d, e]
+    [topology.end_vertex(half), b, c, topology.start_vertex(half), d, e]
 }

@@ -16,7 +16,7 @@ use std::path::Path;
 use rayon::prelude::*;
 
 use self::masks::{VertexValue, limit_value, refined_value};
-use self::normals::LimitNormals;
+use self::normals::LimitNormalCalculator;
 use self::topology::Topology;
 use self::weld::ControlMesh;
 use super::assemble::{drop_unused_vertices, has_area};
@@ -179,7 +179,7 @@ fn limit_surface(
     attributes: &Topology,
     work: ParallelListBuilder<'_>,
 ) -> Result<(Vec<Vec3>, Vec<Vec3>), AssetError> {
-    let limit_normals = LimitNormals::new(shape, points);
+    let limit_normals = LimitNormalCalculator::new(shape, points);
     let place = |vertex: usize| match vertex.checked_sub(attributes.vertex_count()) {
         None => RefinedVertexLocation::Vertex(attributes.vertex_halves[vertex]),
         Some(edge) => RefinedVertexLocation::Edge(attributes.edge_halves[edge]),
@@ -187,7 +187,7 @@ fn limit_surface(
     let count = attributes.vertex_count() + attributes.edge_count();
     let positions = work.build(count, |vertex| {
         let index = match place(vertex) {
-            RefinedVertexLocation::Vertex(half) => shape.start(half) as usize,
+            RefinedVertexLocation::Vertex(half) => shape.start_vertex(half) as usize,
             RefinedVertexLocation::Edge(half) => {
                 shape.vertex_count() + shape.edge_of_half_edge(half) as usize
             }

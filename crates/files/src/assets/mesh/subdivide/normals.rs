@@ -7,7 +7,7 @@ use super::masks::edge_ring;
 use super::topology::{NONE, Topology, WIDE, next_half_edge, previous_half_edge};
 use crate::math::{DVec3, Vec3};
 
-/// Number of neighbors up to which [`LimitNormals`] contains precomputed cosines and sines.
+/// Number of neighbors up to which [`LimitNormalCalculator`] contains precomputed cosines and sines.
 const TABLED: u32 = 24;
 
 /// Length of a cross product of tangents, relative to the square of the ring's radius, below which it consists
@@ -15,14 +15,14 @@ const TABLED: u32 = 24;
 const TINY: f64 = 1e-12;
 
 /// Computes limit normals from the points after the last refinement, and the connectivity before it.
-pub(super) struct LimitNormals<'a> {
+pub(super) struct LimitNormalCalculator<'a> {
     topology: &'a Topology,
     points: &'a [DVec3],
     /// Cosines and sines of multiples of 2π/n, for each number of neighbors n.
     turns: Vec<Vec<[f64; 2]>>,
 }
 
-impl<'a> LimitNormals<'a> {
+impl<'a> LimitNormalCalculator<'a> {
     pub(super) fn new(topology: &'a Topology, points: &'a [DVec3]) -> Self {
         let turns = (0..=TABLED)
             .map(|count| (0..count).map(|index| cos_sin_of_turn_fraction(index, count)).collect());
@@ -32,7 +32,7 @@ impl<'a> LimitNormals<'a> {
     /// Unit normal at the start of a half-edge, on the side of the half-edge's fan. `arms` is a buffer.
     pub(super) fn normal_at_vertex(&self, half: u32, arms: &mut Vec<DVec3>) -> Vec3 {
         let topology = self.topology;
-        let vertex = topology.start(half);
+        let vertex = topology.start_vertex(half);
         let (is_corner, usual) = (topology.is_corner(vertex), topology.vertex_halves[vertex as usize]);
         // In the only fan of a smooth vertex, start at the same half-edge for all of its texture coordinates,
         // so that the sums are identical.
@@ -58,7 +58,7 @@ impl<'a> LimitNormals<'a> {
         let center = self.edge_middle_position(half);
         if topology.twin(half) == NONE {
             let [start, end] =
-                [topology.start(half), topology.end(half)].map(|end| self.points[end as usize]);
+                [topology.start_vertex(half), topology.end_vertex(half)].map(|end| self.points[end as usize]);
             let arms = [
                 end,
                 self.edge_middle_position(next_half_edge(half)),

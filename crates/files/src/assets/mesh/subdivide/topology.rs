@@ -103,13 +103,13 @@ impl Topology {
             let number = topology.edge_halves.len() as u32;
             topology.edge_halves.push(edge[0].1);
             for &(_, half) in edge {
-                let is_reversed = topology.start(half) > topology.end(half);
+                let is_reversed = topology.start_vertex(half) > topology.end_vertex(half);
                 let reversed = if is_reversed { REVERSED } else { 0 };
                 topology.edges[half as usize / 3][half as usize % 3] = number | reversed;
             }
             match *edge {
                 [_] => {}
-                [(_, a), (_, b)] if topology.start(a) == topology.end(b) => {
+                [(_, a), (_, b)] if topology.start_vertex(a) == topology.end_vertex(b) => {
                     topology.twins[a as usize / 3][a as usize % 3] = b;
                     topology.twins[b as usize / 3][b as usize % 3] = a;
                 }
@@ -131,8 +131,9 @@ impl Topology {
         };
         for half in 0..3 * other.triangles.len() as u32 {
             let (face, corner, twin) = (half as usize / 3, half as usize % 3, self.twin(half));
-            let is_joined =
-                twin != NONE && other.start(half) == other.end(twin) && other.end(half) == other.start(twin);
+            let is_joined = twin != NONE
+                && other.start_vertex(half) == other.end_vertex(twin)
+                && other.end_vertex(half) == other.start_vertex(twin);
             if is_joined {
                 other.twins[face][corner] = twin;
             }
@@ -174,32 +175,32 @@ impl Topology {
     pub(super) fn classify_vertices(&mut self, fans: &Fans, is_fixed: impl Fn(u32) -> bool) {
         /// The fans of one vertex.
         #[derive(Clone, Copy)]
-        struct VertexFans {
+        struct FansAtVertex {
             ends: Option<[u32; 2]>,
             fans: u32,
             most_faces: u32,
             is_corner: bool,
         }
-        let none = VertexFans { ends: None, fans: 0, most_faces: 0, is_corner: false };
+        let none = FansAtVertex { ends: None, fans: 0, most_faces: 0, is_corner: false };
         let mut seen = vec![none; self.vertex_halves.len()];
         for fan in &fans.list {
             let ends = fan.last.map(|last| {
-                let ends = [self.end(fan.start), self.start(last)];
+                let ends = [self.end_vertex(fan.start), self.start_vertex(last)];
                 [ends[0].min(ends[1]), ends[0].max(ends[1])]
             });
-            let vertex = &mut seen[self.start(fan.start) as usize];
+            let vertex = &mut seen[self.start_vertex(fan.start) as usize];
             let is_same = vertex.fans == 0 || ends.is_some() && ends == vertex.ends;
             vertex.is_corner |= !is_same || ends.is_some_and(|[a, b]| a == b);
             vertex.ends = ends;
             vertex.fans += 1;
             vertex.most_faces = vertex.most_faces.max(fan.faces);
         }
-        let corner = |(number, vertex): (usize, &VertexFans)| {
+        let corner = |(number, vertex): (usize, &FansAtVertex)| {
             let is_lone = vertex.ends.is_some() && vertex.most_faces == 1;
             vertex.is_corner || is_lone || is_fixed(number as u32)
         };
         let corners: Vec<bool> = seen.iter().enumerate().map(corner).collect();
-        let wide = |(vertex, is_corner): (&VertexFans, &bool)| {
+        let wide = |(vertex, is_corner): (&FansAtVertex, &bool)| {
             vertex.ends.is_some() && vertex.most_faces >= WIDE && !is_corner
         };
         let wide: Vec<bool> = seen.iter().zip(&corners).map(wide).collect();
@@ -218,12 +219,12 @@ impl Topology {
     }
 
     /// Start vertex of a half-edge.
-    pub(super) fn start(&self, half: u32) -> u32 {
+    pub(super) fn start_vertex(&self, half: u32) -> u32 {
         value_at_half_edge(&self.triangles, half)
     }
 
     /// End vertex of a half-edge.
-    pub(super) fn end(&self, half: u32) -> u32 {
+    pub(super) fn end_vertex(&self, half: u32) -> u32 {
         value_at_half_edge(&self.triangles, next_half_edge(half))
     }
 
@@ -307,7 +308,7 @@ impl Topology {
         let triangles = self.refined_triangles(work)?;
         let (faces, first) = (self.triangles.len(), 2 * self.edge_count() as u32);
         let twins = work.build(faces, |face| self.twins_of_children(face as u32))?.into_flattened();
-        let edges = work.build(faces, |face| self.edges_of_children(face as u32, first))?.into_flattened();
+        let edges = work.build(faces, |face| self.edges_of_child_faces(face as u32, first))?.into_flattened();
         let edge_halves =
             work.build(first as usize + 3 * faces, |edge| match (edge as u32).checked_sub(first) {
                 Some(inner) => 3 * child_face(inner / 3, inner % 3) + 1,
@@ -341,7 +342,7 @@ impl Topology {
         [at_corner(0), at_corner(1), at_corner(2), [inner(1), inner(2), inner(0)]]
     }
 
-    fn edges_of_children(&self, face: u32, first_inner: u32) -> [[u32; 3]; 4] {
+    fn edges_of_child_faces(&self, face: u32, first_inner: u32) -> [[u32; 3]; 4] {
         let edges = self.edges[face as usize];
         let is_reversed = |edge: u32| u32::from(edge & REVERSED != 0);
         // The shift drops the bit for the direction.

@@ -35,7 +35,7 @@ impl ControlMesh {
     /// Welds the vertices of a mesh that coincide. Drops triangles with coincident corners and vertices without
     /// triangles.
     pub(super) fn weld(mesh: &mut TriangleMesh, work: ParallelListBuilder<'_>) -> Result<Self, AssetError> {
-        let (triangles, sources) = welded_triangles(mesh, work)?;
+        let (triangles, sources) = weld_triangles(mesh, work)?;
         let points: Vec<DVec3> =
             sources.iter().map(|vertex| mesh.positions[*vertex as usize].as_dvec3()).collect();
         let (mut shape, improper_edges) = Topology::connect(triangles, points.len(), work)?;
@@ -71,7 +71,7 @@ fn gather_and_convert<T: Copy, U>(values: &[T], vertices: &[u32], convert: impl 
 /// Returns the triangles with welded vertices, and the first of the mesh's vertices for each welded vertex, in
 /// the order of the corners. This order is independent of how a file splits its vertices. Removes triangles
 /// with coincident corners from the mesh.
-fn welded_triangles(
+fn weld_triangles(
     mesh: &mut TriangleMesh,
     work: ParallelListBuilder<'_>,
 ) -> Result<(Vec<[u32; 3]>, Vec<u32>), AssetError> {
@@ -119,7 +119,7 @@ fn split_vertices_by_attributes(
             let vertex = mesh.triangles[face][corner];
             let known = &sources[first..];
             let recent = known.len().saturating_sub(COMPARED);
-            let is_same = |other: &u32| has_same_attributes(mesh, *other, vertex);
+            let is_same = |other: &u32| has_same_uvs_and_color(mesh, *other, vertex);
             let found = known[recent..].iter().position(is_same).map(|index| first + recent + index);
             corners[face][corner] = found.unwrap_or(sources.len()) as u32;
             if found.is_none() {
@@ -131,7 +131,7 @@ fn split_vertices_by_attributes(
 }
 
 /// Whether two vertices have equal texture coordinates and colors.
-fn has_same_attributes(mesh: &TriangleMesh, a: u32, b: u32) -> bool {
+fn has_same_uvs_and_color(mesh: &TriangleMesh, a: u32, b: u32) -> bool {
     let (a, b) = (a as usize, b as usize);
     let has_same_uvs = |uvs: &[Vec2]| uvs.is_empty() || uvs[a] == uvs[b];
     let has_same_color = mesh.colors.is_empty() || mesh.colors[a] == mesh.colors[b];
@@ -144,13 +144,13 @@ fn seamed_topology(shape: &Topology, corners: Vec<[u32; 3]>, vertices: usize) ->
     let mut seamed = shape.with_replaced_vertices(corners, vertices);
     let mut seams = vec![0_u32; shape.vertex_count()];
     for &half in shape.edge_halves.iter().filter(|half| seamed.twin(**half) == NONE) {
-        seams[shape.start(half) as usize] += 1;
-        seams[shape.end(half) as usize] += 1;
+        seams[shape.start_vertex(half) as usize] += 1;
+        seams[shape.end_vertex(half) as usize] += 1;
     }
     let fans = seamed.find_fans();
     let starts = seamed.vertex_halves.clone();
     seamed.classify_vertices(&fans, |vertex| {
-        let point = shape.start(starts[vertex as usize]);
+        let point = shape.start_vertex(starts[vertex as usize]);
         shape.is_corner(point) || seams[point as usize] >= 3
     });
     seamed

@@ -89,7 +89,7 @@ impl UpperNodes {
             None => {
                 let subtree = starts.partition_point(|start| start.node <= place) - 1;
                 let start = &starts[subtree];
-                start.offset_node(&self.subtrees[subtree].nodes[(place - start.node) as usize])
+                start.with_offset_children(&self.subtrees[subtree].nodes[(place - start.node) as usize])
             }
         };
         (0..total).into_par_iter().map(node).collect_into_vec(&mut nodes);
@@ -136,7 +136,7 @@ impl SubtreeStart {
         }
     }
 
-    fn offset_node(&self, node: &WideNode) -> WideNode {
+    fn with_offset_children(&self, node: &WideNode) -> WideNode {
         let mut moved = *node;
         for slot in 0..WIDTH {
             if node.child_bounds(slot).is_some() {

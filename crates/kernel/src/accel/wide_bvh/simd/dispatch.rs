@@ -15,10 +15,10 @@ impl InstructionSet {
     /// Runs a kernel with this instruction set, or with the fastest supported one if the processor lacks it.
     #[inline]
     pub fn run<L: SimdKernel>(self, work: L) -> L::Output {
-        match self.or_best_supported() {
+        match self.or_best_if_unsupported() {
             Self::Portable => PortableSimd.call_out_of_line(work),
             #[cfg(target_arch = "x86_64")]
-            // SAFETY: `or_best_supported` returns an instruction set that the processor supports.
+            // SAFETY: `or_best_if_unsupported` returns an instruction set that the processor supports.
             Self::Avx2 => unsafe { run_avx2(work) },
             #[cfg(target_arch = "x86_64")]
             // SAFETY: as above.
@@ -96,7 +96,7 @@ impl Simd for Avx512Simd {
     #[inline(always)]
     fn min_max(self, row: &F32x16, of: u32) -> [f32; 2] {
         // SAFETY: as above.
-        unsafe { avx512_masked_min_max(row, of) }
+        unsafe { avx512_min_max_of_lanes(row, of) }
     }
 
     #[inline(always)]
@@ -171,7 +171,7 @@ fn avx2_masked_min_max(row: &F32x16, of: u32) -> [f32; 2] {
 #[cfg(target_arch = "x86_64")]
 #[inline]
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw")]
-fn avx512_masked_min_max(row: &F32x16, of: u32) -> [f32; 2] {
+fn avx512_min_max_of_lanes(row: &F32x16, of: u32) -> [f32; 2] {
     let other = _mm512_set1_ps(row[of.trailing_zeros() as usize % PACKET_SIZE]);
     // SAFETY: reads 16 numbers; no alignment is required.
     let row = unsafe { _mm512_mask_loadu_ps(other, of as u16, row.as_ptr()) };

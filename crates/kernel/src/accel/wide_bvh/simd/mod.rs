@@ -56,14 +56,14 @@ impl InstructionSet {
         static BEST: LazyLock<InstructionSet> =
             LazyLock::new(|| match std::env::var("GLIMT_SIMD").as_deref() {
                 Ok("portable") => InstructionSet::Portable,
-                Ok("avx2") => InstructionSet::Avx2.or_best_supported(),
-                _ => InstructionSet::Avx512.or_best_supported(),
+                Ok("avx2") => InstructionSet::Avx2.or_best_if_unsupported(),
+                _ => InstructionSet::Avx512.or_best_if_unsupported(),
             });
         *BEST
     }
 
     /// This instruction set, or the fastest supported one if the processor lacks it.
-    pub fn or_best_supported(self) -> Self {
+    pub fn or_best_if_unsupported(self) -> Self {
         static AVAILABLE: LazyLock<InstructionSet> = LazyLock::new(best_supported);
         self.min(*AVAILABLE)
     }
@@ -93,7 +93,7 @@ pub fn closest_hit(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
         InstructionSet::Portable => portable::closest_hit(tree, ray),
         #[cfg(target_arch = "x86_64")]
         // SAFETY: a tree only has an instruction set that the processor supports
-        // (`InstructionSet::or_best_supported`).
+        // (`InstructionSet::or_best_if_unsupported`).
         InstructionSet::Avx2 | InstructionSet::Avx512 => unsafe { single::closest_hit(tree, ray) },
         #[cfg(not(target_arch = "x86_64"))]
         InstructionSet::Avx2 | InstructionSet::Avx512 => portable::closest_hit(tree, ray),

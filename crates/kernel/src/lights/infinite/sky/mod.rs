@@ -3,7 +3,7 @@
 //!
 //! | files | contents |
 //! | --- | --- |
-//! | `model` | [`SkyParameters`]; the published tables, and their interpolation |
+//! | `model` | [`SkyModelInputs`]; the published tables, and their interpolation |
 //! | [`sun`] | the sun's disk |
 //! | this file | [`SkyDome`]: radiance from all directions, and its sampling distribution |
 
@@ -13,7 +13,7 @@ pub mod sun;
 use std::f32::consts::PI;
 use std::sync::Arc;
 
-pub use self::model::SkyParameters;
+pub use self::model::SkyModelInputs;
 use self::model::sky_coefficients;
 use self::sun::SunDisk;
 use crate::math::color::luminance;
@@ -33,7 +33,7 @@ pub struct Sky {
 
 impl Sky {
     /// Evaluates the model and builds the sampling distribution, in a few milliseconds.
-    pub fn new(parameters: &SkyParameters) -> Self {
+    pub fn new(parameters: &SkyModelInputs) -> Self {
         let sun = (parameters.sun_scale > 0.0).then(|| Arc::new(SunDisk::new(parameters)));
         let of_sun = sun.as_ref().map_or(DVec3::ZERO, |sun| sun.horizontal_irradiance());
         Self { dome: SkyDome::new(parameters, of_sun).map(Arc::new), sun }
@@ -97,7 +97,7 @@ const ROWS: usize = 64;
 impl SkyDome {
     /// Evaluates the model. `sun_irradiance` is the sun's irradiance on the ground. Returns `None` if the sky
     /// and the ground are black.
-    fn new(parameters: &SkyParameters, sun_irradiance: DVec3) -> Option<Self> {
+    fn new(parameters: &SkyModelInputs, sun_irradiance: DVec3) -> Option<Self> {
         let channels = [0, 1, 2].map(|channel| SkyChannel::new(parameters, channel));
         let (sin, cos) = (libm::sin(parameters.sun_elevation), libm::cos(parameters.sun_elevation));
         let frame = SkyFrame::new(DVec3::new(cos, sin, 0.0), DVec3::Y);
@@ -234,7 +234,7 @@ struct SkyChannel(
 );
 
 impl SkyChannel {
-    fn new(parameters: &SkyParameters, channel: usize) -> Self {
+    fn new(parameters: &SkyModelInputs, channel: usize) -> Self {
         let mut all = sky_coefficients(parameters, channel);
         all[1] *= std::f64::consts::LOG2_E;
         all[4] *= std::f64::consts::LOG2_E;

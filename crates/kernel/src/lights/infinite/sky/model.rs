@@ -13,7 +13,7 @@ use crate::math::{DVec3, Vec3};
 
 /// Parameters of a sky.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SkyParameters {
+pub struct SkyModelInputs {
     /// Elevation of the sun's center in radians, in (0, π/2].
     pub sun_elevation: f64,
     /// Turbidity of the air, from 1 to 10.
@@ -68,8 +68,8 @@ fn turbidity_index_and_fraction(turbidity: f64) -> (usize, f64) {
 
 /// Coefficients of one channel. The tables are interpolated linearly over turbidity and albedo, and with
 /// Bézier curves of degree 5 over the cube root of the elevation.
-pub(super) fn sky_coefficients(parameters: &SkyParameters, channel: usize) -> SkyCoefficients {
-    let SkyParameters { sun_elevation, turbidity, ground, .. } = *parameters;
+pub(super) fn sky_coefficients(parameters: &SkyModelInputs, channel: usize) -> SkyCoefficients {
+    let SkyModelInputs { sun_elevation, turbidity, ground, .. } = *parameters;
     let albedo = f64::from(ground[channel]);
     let x = libm::cbrt(sun_elevation / FRAC_PI_2).min(1.0);
     let (first, fraction) = turbidity_index_and_fraction(turbidity);

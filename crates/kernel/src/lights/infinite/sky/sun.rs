@@ -3,7 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::sync::Arc;
 
-use super::model::{LIMB_DARKENING, SkyParameters, sun_radiance};
+use super::model::{LIMB_DARKENING, SkyModelInputs, sun_radiance};
 use crate::math::{DVec3, Vec3};
 
 /// The model's angular diameter of the sun, in degrees. Disks of other diameters are scaled to the same
@@ -33,8 +33,8 @@ pub struct SunDisk {
 
 impl SunDisk {
     /// Creates the disk.
-    pub(super) fn new(parameters: &SkyParameters) -> Self {
-        let SkyParameters { sun_elevation, turbidity, sun_angle, sun_scale, .. } = *parameters;
+    pub(super) fn new(parameters: &SkyModelInputs) -> Self {
+        let SkyModelInputs { sun_elevation, turbidity, sun_angle, sun_scale, .. } = *parameters;
         let one_minus_cos = |angle: f64| 2.0 * libm::sin(angle / 4.0) * libm::sin(angle / 4.0);
         let model_angle = SUN_ANGLE_DEGREES.to_radians();
         let scale = f64::from(sun_scale) * (one_minus_cos(model_angle) / one_minus_cos(sun_angle));

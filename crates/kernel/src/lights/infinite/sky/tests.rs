@@ -6,8 +6,8 @@ use crate::lights::Light;
 use crate::lights::infinite::{DirectionalLight, Environment};
 use crate::math::random::TestRandom;
 
-fn parameters(turbidity: f64, degrees: f64, ground: [f32; 3]) -> SkyParameters {
-    SkyParameters {
+fn parameters(turbidity: f64, degrees: f64, ground: [f32; 3]) -> SkyModelInputs {
+    SkyModelInputs {
         sun_elevation: degrees.to_radians(),
         turbidity,
         ground: Vec3::from_array(ground),
@@ -23,7 +23,7 @@ fn direction(elevation: f64, azimuth: f64) -> DVec3 {
     DVec3::new(elevation.cos() * azimuth.cos(), elevation.sin(), elevation.cos() * azimuth.sin())
 }
 
-fn frame(parameters: &SkyParameters) -> SkyFrame {
+fn frame(parameters: &SkyModelInputs) -> SkyFrame {
     SkyFrame::new(direction(parameters.sun_elevation, 0.0), DVec3::Y)
 }
 
@@ -78,7 +78,7 @@ fn sun_matches_the_published_model() {
 }
 
 /// A sun with its direction.
-fn sun_light(parameters: &SkyParameters) -> (DirectionalLight, DVec3) {
+fn sun_light(parameters: &SkyModelInputs) -> (DirectionalLight, DVec3) {
     let frame = frame(parameters);
     let disk = OrientedSunDisk { disk: Sky::new(parameters).sun.expect("a sun"), up: frame.up() };
     (DirectionalLight::from_sun(frame.sun(), disk), direction(parameters.sun_elevation, 0.0))
@@ -96,7 +96,7 @@ fn sun_irradiance_is_radiance_times_solid_angle() {
         * 2.0
         * (SUN_ANGLE_DEGREES.to_radians() / 4.0).sin().powi(2);
     for degrees in [SUN_ANGLE_DEGREES, 5.0, 30.0] {
-        let parameters = SkyParameters {
+        let parameters = SkyModelInputs {
             sun_angle: degrees.to_radians(),
             sun_scale: 0.5,
             ..parameters(3.0, 40.0, [0.3; 3])
@@ -167,7 +167,7 @@ fn over_sky(function: impl Fn(Vec3) -> DVec3) -> DVec3 {
 fn ground_reflects_the_light_of_sky_and_sun() {
     for (sun_scale, sky_scale) in [(0.0, 1.0), (0.5, 0.0), (2.0, 0.7)] {
         let ground = [0.1, 0.4, 0.8];
-        let parameters = SkyParameters { sun_scale, sky_scale, ..parameters(4.0, 35.0, ground) };
+        let parameters = SkyModelInputs { sun_scale, sky_scale, ..parameters(4.0, 35.0, ground) };
         let (sky, frame) = (Sky::new(&parameters), frame(&parameters));
         let dome = sky.dome.expect("a ground");
         let of_sky =
@@ -187,9 +187,9 @@ fn ground_reflects_the_light_of_sky_and_sun() {
 
 #[test]
 fn black_skies_and_suns_are_absent() {
-    let black = SkyParameters { sun_scale: 0.0, sky_scale: 0.0, ..parameters(3.0, 45.0, [0.3; 3]) };
+    let black = SkyModelInputs { sun_scale: 0.0, sky_scale: 0.0, ..parameters(3.0, 45.0, [0.3; 3]) };
     assert_eq!(Sky::new(&black), Sky { dome: None, sun: None });
-    let sun = Sky::new(&SkyParameters { sun_scale: 1.0, ground: Vec3::ZERO, ..black });
+    let sun = Sky::new(&SkyModelInputs { sun_scale: 1.0, ground: Vec3::ZERO, ..black });
     assert!(sun.dome.is_none() && sun.sun.is_some());
 }
 
@@ -219,7 +219,7 @@ fn samples_have_the_pdf_of_their_direction() {
     for (turbidity, degrees, sky_scale) in
         [(2.0, 5.0, 1.0), (10.0, 1.0, 1.0), (4.0, 90.0, 1.0), (4.0, 40.0, 0.0)]
     {
-        let parameters = SkyParameters { sky_scale, ..parameters(turbidity, degrees, [0.3; 3]) };
+        let parameters = SkyModelInputs { sky_scale, ..parameters(turbidity, degrees, [0.3; 3]) };
         let (dome, frame) = (Sky::new(&parameters).dome.expect("a sky"), frame(&parameters));
         let light = Light::Environment(Environment::Sky { dome: dome.clone(), frame });
         let mut random = TestRandom::new(7);
@@ -262,7 +262,7 @@ fn pdfs_integrate_to_one() {
 #[test]
 fn ground_scale_changes_only_the_ground() {
     let usual = parameters(3.0, 40.0, [0.3; 3]);
-    let of = |ground_scale: f32| Sky::new(&SkyParameters { ground_scale, ..usual }).dome.expect("a dome");
+    let of = |ground_scale: f32| Sky::new(&SkyModelInputs { ground_scale, ..usual }).dome.expect("a dome");
     let (full, half, none) = (of(1.0), of(0.5), of(0.0));
     let frame = SkyFrame::new(direction(40_f64.to_radians(), 0.0), DVec3::Y);
     for elevation in [-1.2_f64, -0.1, 0.1, 1.2] {

@@ -9,7 +9,7 @@ use crate::materials::bxdfs::lobe_tests::{
     ALPHAS, COSINES, NarrowLightPath, TestSurface, check_values, estimate_close_to_exact, spherical_direction,
 };
 use crate::materials::bxdfs::reference_tests::reference_microfacet_brdf;
-use crate::materials::coat::CoatInputs;
+use crate::materials::coat::CoatTexturedParameters;
 use crate::materials::conductor::{ConductorBxdf, ConductorPoint, FresnelPoint};
 use crate::materials::lookup::WhiteTextureLookup;
 use crate::materials::microfacet::MicrofacetDistribution;
@@ -30,7 +30,7 @@ const TINT: Vec3 = Vec3::new(0.9, 0.6, 0.2);
 /// A material under a coat.
 fn coated<P>(base: P, weight: f32, alpha: f32, ior: f32, tint: Vec3) -> CoatedPoint<P> {
     let [weight, roughness] = [weight, alpha.sqrt()].map(ScalarParameter::Constant);
-    let inputs = CoatInputs { weight, roughness, ior, tint: ColorOrTexture::Constant(tint) };
+    let inputs = CoatTexturedParameters { weight, roughness, ior, tint: ColorOrTexture::Constant(tint) };
     let coat = Coat::new(inputs).expect("a coat").look_up_parameters(&mut WhiteTextureLookup);
     CoatedPoint { coat, base }
 }

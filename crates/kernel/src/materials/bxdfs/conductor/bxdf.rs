@@ -5,7 +5,7 @@ use crate::materials::bsdf::NarrowLobe;
 use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, LobesWithNormal, ShadingGeometry};
 use crate::materials::fresnel::schlick_weight;
 use crate::materials::microfacet::{
-    MicrofacetDistribution, SmithTerms, UnnormalizedHalfVector, frame_with_tangent,
+    MicrofacetDistribution, SmithDirectionTerms, UnnormalizedHalfVector, frame_with_tangent,
     sample_reflected_direction,
 };
 use crate::math::Vec3;
@@ -49,18 +49,18 @@ impl<const BRUSHED: bool, const BECKMANN: bool> ConductorBxdf<BRUSHED, BECKMANN>
 
     /// Smith terms for the directions to the viewer and to the light.
     #[inline(always)]
-    fn view_and_light_smith_terms(&self, view: &ConductorViewTerms, wi: Vec3) -> [SmithTerms; 2] {
+    fn view_and_light_smith_terms(&self, view: &ConductorViewTerms, wi: Vec3) -> [SmithDirectionTerms; 2] {
         if BRUSHED {
             let frame = Self::frame(view);
             [
-                SmithTerms::anisotropic(Self::DISTRIBUTION, &frame, view.wo, self.alphas),
-                SmithTerms::anisotropic(Self::DISTRIBUTION, &frame, wi, self.alphas),
+                SmithDirectionTerms::anisotropic(Self::DISTRIBUTION, &frame, view.wo, self.alphas),
+                SmithDirectionTerms::anisotropic(Self::DISTRIBUTION, &frame, wi, self.alphas),
             ]
         } else {
             let alpha = self.alphas[0];
             [
-                SmithTerms::isotropic(Self::DISTRIBUTION, view.normal, view.wo, alpha),
-                SmithTerms::isotropic(Self::DISTRIBUTION, view.normal, wi, alpha),
+                SmithDirectionTerms::isotropic(Self::DISTRIBUTION, view.normal, view.wo, alpha),
+                SmithDirectionTerms::isotropic(Self::DISTRIBUTION, view.normal, wi, alpha),
             ]
         }
     }

@@ -11,7 +11,7 @@ use crate::materials::coat::clamp_cosine_to_nonnegative;
 use crate::materials::fresnel::schlick_weight;
 use crate::materials::lobe_albedo::{TERMS, evaluate_albedo_fit};
 use crate::materials::microfacet::{
-    MicrofacetDistribution, SmithTerms, UnnormalizedHalfVector, sample_reflected_direction,
+    MicrofacetDistribution, SmithDirectionTerms, UnnormalizedHalfVector, sample_reflected_direction,
 };
 use crate::materials::phong::lobes::direction_about_axis;
 use crate::math::Vec3;
@@ -73,7 +73,7 @@ impl<const THROUGH: bool> PrincipledBxdf<THROUGH> {
     /// Albedos of the specular lobe at a cosine ≥ 0, per unit of reflectance at normal incidence and at
     /// grazing angles.
     #[inline(always)]
-    fn normal_and_grazing_albedos(&self, cosine: f32) -> [f32; 2] {
+    fn f0_and_f90_albedos(&self, cosine: f32) -> [f32; 2] {
         [
             evaluate_albedo_fit(cosine, |number| self.terms[number]),
             evaluate_albedo_fit(cosine, |number| self.grazing_terms[number]),
@@ -83,7 +83,7 @@ impl<const THROUGH: bool> PrincipledBxdf<THROUGH> {
     /// Fraction of the light that passes through the dielectric's specular lobe at a cosine ≥ 0.
     #[inline(always)]
     fn one_minus_specular_albedo(&self, cosine: f32) -> Vec3 {
-        let [normal, grazing] = self.normal_and_grazing_albedos(cosine);
+        let [normal, grazing] = self.f0_and_f90_albedos(cosine);
         let rest = Vec3::ONE - self.dielectric * normal - Vec3::splat(self.dielectric_grazing * grazing);
         // If the facets reflect everything, no light passes. Clamp to 0 because rounding could make the
         // result negative.
@@ -96,10 +96,10 @@ impl<const THROUGH: bool> PrincipledBxdf<THROUGH> {
 
     /// Smith terms for the directions to the viewer and to the light.
     #[inline(always)]
-    fn view_and_light_smith_terms(&self, view: &PrincipledViewTerms, wi: Vec3) -> [SmithTerms; 2] {
+    fn view_and_light_smith_terms(&self, view: &PrincipledViewTerms, wi: Vec3) -> [SmithDirectionTerms; 2] {
         [
-            SmithTerms::isotropic(GGX, view.normal, view.wo, self.alpha),
-            SmithTerms::isotropic(GGX, view.normal, wi, self.alpha),
+            SmithDirectionTerms::isotropic(GGX, view.normal, view.wo, self.alpha),
+            SmithDirectionTerms::isotropic(GGX, view.normal, wi, self.alpha),
         ]
     }
 }
@@ -140,7 +140,7 @@ impl<const THROUGH: bool> Bxdf for PrincipledBxdf<THROUGH> {
         let wo = if THROUGH { mirrored } else { wo };
         let cosine = clamp_cosine_to_nonnegative(normal.dot(wo));
         let transmittance = self.one_minus_specular_albedo(cosine);
-        let [at_normal, at_grazing] = self.normal_and_grazing_albedos(cosine);
+        let [at_normal, at_grazing] = self.f0_and_f90_albedos(cosine);
         let specular = self.facets.max_element() * at_normal + self.grazing * at_grazing;
         let [diffuse, through] = self.diffuse_albedos;
         let (diffuse, through) =

@@ -7,7 +7,8 @@ use crate::materials::bxdf::{
 };
 use crate::materials::fresnel::{dielectric_for_any_eta, fresnel_transmittance};
 use crate::materials::microfacet::{
-    MicrofacetDistribution, SmithTerms, UnnormalizedHalfVector, reflect_at, refract_at, sample_visible_normal,
+    MicrofacetDistribution, SmithDirectionTerms, UnnormalizedHalfVector, reflect_at, refract_at,
+    sample_visible_normal,
 };
 use crate::math::Vec3;
 use crate::math::frame::Frame;
@@ -57,17 +58,17 @@ impl<const THROUGH: bool, const BECKMANN: bool> DielectricBxdf<THROUGH, BECKMANN
     /// Smith terms for the directions to the viewer and to the light. Each direction uses the normal on its
     /// side.
     #[inline(always)]
-    fn view_and_light_smith_terms(&self, view: &DielectricViewTerms, wi: Vec3) -> [SmithTerms; 2] {
+    fn view_and_light_smith_terms(&self, view: &DielectricViewTerms, wi: Vec3) -> [SmithDirectionTerms; 2] {
         let lit = if THROUGH { -view.normal } else { view.normal };
         [
-            SmithTerms::isotropic(Self::DISTRIBUTION, view.normal, view.wo, self.alpha),
-            SmithTerms::isotropic(Self::DISTRIBUTION, lit, wi, self.alpha),
+            SmithDirectionTerms::isotropic(Self::DISTRIBUTION, view.normal, view.wo, self.alpha),
+            SmithDirectionTerms::isotropic(Self::DISTRIBUTION, lit, wi, self.alpha),
         ]
     }
 
     /// Samples the normal of a visible facet.
     #[inline(always)]
-    fn sample_facet(&self, view: &DielectricViewTerms, u: [f32; 2]) -> Vec3 {
+    fn sample_facet_normal(&self, view: &DielectricViewTerms, u: [f32; 2]) -> Vec3 {
         let frame = Frame::from_normal(view.normal);
         sample_visible_normal(Self::DISTRIBUTION, &frame, view.wo, [self.alpha; 2], u)
     }
@@ -113,7 +114,7 @@ impl<const THROUGH: bool, const BECKMANN: bool> DielectricBxdf<THROUGH, BECKMANN
         u: [f32; 2],
     ) -> DielectricSample {
         let &DielectricViewTerms { normal, wo } = view;
-        let half = self.sample_facet(view, u);
+        let half = self.sample_facet_normal(view, u);
         let indices = [self.near, self.far];
         let eta = indices[1] / indices[0];
         let cosine = half.dot(wo);
@@ -129,9 +130,9 @@ impl<const THROUGH: bool, const BECKMANN: bool> DielectricBxdf<THROUGH, BECKMANN
         let by_facet = if is_reflected { reflectance } else { through * (indices[1] * indices[1]) };
         let is_through = (cosine > MIN_COSINE) & (behind > MIN_COSINE);
         // Light on the wrong side of the surface does not contribute.
-        let eye = SmithTerms::isotropic(Self::DISTRIBUTION, normal, wo, self.alpha);
+        let eye = SmithDirectionTerms::isotropic(Self::DISTRIBUTION, normal, wo, self.alpha);
         let side = if is_reflected { 1.0 } else { -1.0 };
-        let light = SmithTerms::isotropic(Self::DISTRIBUTION, normal * side, wi, self.alpha);
+        let light = SmithDirectionTerms::isotropic(Self::DISTRIBUTION, normal * side, wi, self.alpha);
         let along = normal.dot(half);
         let half = UnnormalizedHalfVector { squared: 1.0, along, across: half - normal * along };
         let pdf = by_facet * eye.reflection_pdf(half.isotropic_d(Self::DISTRIBUTION, self.alpha));
@@ -194,7 +195,7 @@ impl<const THROUGH: bool, const BECKMANN: bool> Bxdf for DielectricBxdf<THROUGH,
         [choice, u @ ..]: [f32; 3],
         _: BxdfFlags,
     ) -> Vec3 {
-        let half = self.sample_facet(view, u);
+        let half = self.sample_facet_normal(view, u);
         let eta = self.far / self.near;
         let is_reflected = choice < dielectric_for_any_eta(half.dot(view.wo), eta);
         let wi = if THROUGH { refract_at(half, view.wo, eta) } else { reflect_at(half, view.wo) };

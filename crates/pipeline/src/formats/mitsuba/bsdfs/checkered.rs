@@ -13,7 +13,7 @@ type CellAlphas = [[f64; 2]; 2];
 
 impl<'a> SceneReader<'a> {
     /// Adds `roughness` and `anisotropy` for values of α along u and v.
-    pub(super) fn add_alpha_pair(
+    pub(super) fn add_roughness_from_alphas(
         &mut self,
         keys: &mut TableEntries,
         object: &'a PluginInstance,
@@ -37,7 +37,11 @@ impl<'a> SceneReader<'a> {
             keys.push(("anisotropy", shorten_number(signed.clamp(-1.0, 1.0)).into()));
         } else if signed != 0.0 {
             let text = "replaced by its mean";
-            self.notes.substitute_light("anisotropic roughness of glass", text, object.span.clone());
+            self.notes.substitute_changing_lighting(
+                "anisotropic roughness of glass",
+                text,
+                object.span.clone(),
+            );
         }
     }
 
@@ -51,10 +55,10 @@ impl<'a> SceneReader<'a> {
         let mut cells = [[0.1; 2]; 2];
         let mut board: Option<(&'a PluginInstance, DMat4)> = None;
         for (axis, name) in ["alpha_u", "alpha_v"].into_iter().enumerate() {
-            match self.number(object, name, 0.1) {
+            match self.number_or_texture(object, name, 0.1) {
                 NumberSource::Constant(alpha) => cells.iter_mut().for_each(|cell| cell[axis] = alpha),
                 NumberSource::Texture(texture) => {
-                    let inner = self.object(texture);
+                    let inner = self.object_by_index(texture);
                     if inner.plugin != "checkerboard" {
                         return None;
                     }
@@ -91,7 +95,7 @@ impl<'a> SceneReader<'a> {
         for alphas in cells {
             let mut keys = keys.clone();
             self.add_distribution_name(&mut keys, object);
-            self.add_alpha_pair(&mut keys, object, alphas, true);
+            self.add_roughness_from_alphas(&mut keys, object, alphas, true);
             let mut metal = MaterialBuilder::one_sided("metal", keys);
             metal.is_one_sided &= !context.is_two_sided;
             self.add_enclosing_keys(&mut metal, context);

@@ -105,8 +105,9 @@ impl<'a> SceneReader<'a> {
         shape: &'a PluginInstance,
     ) -> Option<String> {
         let index = bsdf.map(|child| child.target);
-        let has_textures =
-            self.any_nested(index.into_iter().chain(emitter), |inner| inner.kind == ObjectKind::Texture);
+        let has_textures = self.any_nested_object_satisfies(index.into_iter().chain(emitter), |inner| {
+            inner.kind == ObjectKind::Texture
+        });
         let uv = if has_textures { uv } else { UvConvention::default() };
         let mesh = self.attributes.as_ref().map(|mesh| mesh.id);
         let tint = self.interior_tint.map(|tint| tint.to_array().map(f64::to_bits));
@@ -123,14 +124,14 @@ impl<'a> SceneReader<'a> {
             Some(child) => self.bsdf(child.target, context),
             None => Some(MaterialBuilder::one_sided("phong", vec![("diffuse", 0.5.into())])),
         };
-        let span = bsdf.map_or(shape.span.clone(), |child| self.object(child.target).span.clone());
+        let span = bsdf.map_or(shape.span.clone(), |child| self.object_by_index(child.target).span.clone());
         let name = builder.and_then(|mut builder| {
             if let Some(emitter) = emitter {
                 self.add_emission(&mut builder, emitter, uv, shape);
             } else if builder.is_invisible {
                 return None;
             }
-            let wanted = bsdf.map(|child| self.object(child.target));
+            let wanted = bsdf.map(|child| self.object_by_index(child.target));
             let wanted = wanted.map_or("default", |object| object.id.as_deref().unwrap_or(&object.plugin));
             Some(self.add_material(builder, wanted, span))
         });
@@ -166,10 +167,14 @@ impl<'a> SceneReader<'a> {
         shape: &'a PluginInstance,
     ) {
         let index = emitter;
-        let emitter = self.object(index);
+        let emitter = self.object_by_index(index);
         if builder.is_blend {
             let text = "the shape does not emit";
-            self.notes.substitute_light("an area light on a `blendbsdf`", text, shape.span.clone());
+            self.notes.substitute_changing_lighting(
+                "an area light on a `blendbsdf`",
+                text,
+                shape.span.clone(),
+            );
             return;
         }
         if builder.is_invisible {
@@ -182,15 +187,17 @@ impl<'a> SceneReader<'a> {
                     builder.keys.push(("emission", shorten_color(color)));
                 }
             }
-            ColorSource::Texture(texture) => match self.texture(texture, MitsubaTextureUse::Color, uv) {
-                Some(name) => {
-                    builder.keys.push(("emission", BuiltValue::Table(vec![("texture", name.into())])));
+            ColorSource::Texture(texture) => {
+                match self.find_or_add_texture(texture, MitsubaTextureUse::Color, uv) {
+                    Some(name) => {
+                        builder.keys.push(("emission", BuiltValue::Table(vec![("texture", name.into())])));
+                    }
+                    None => {
+                        let color = self.color_if_spectrum(texture, ColorRole::Emission);
+                        builder.keys.push(("emission", shorten_color(color.unwrap_or(DVec3::ONE))));
+                    }
                 }
-                None => {
-                    let color = self.constant_of_texture(texture, ColorRole::Emission);
-                    builder.keys.push(("emission", shorten_color(color.unwrap_or(DVec3::ONE))));
-                }
-            },
+            }
         }
         self.report_unused(index);
         self.report_unused_children(index);
@@ -198,9 +205,9 @@ impl<'a> SceneReader<'a> {
 
     /// Converts a BSDF. Returns `None` after an error.
     fn bsdf(&mut self, index: ObjectIndex, context: BsdfContext) -> Option<MaterialBuilder> {
-        let object = self.object(index);
+        let object = self.object_by_index(index);
         if context.depth > MAX_DEPTH {
-            self.error(object.span.clone(), "BSDFs are nested too deeply", None);
+            self.report_error(object.span.clone(), "BSDFs are nested too deeply", None);
             return None;
         }
         let context = BsdfContext { depth: context.depth + 1, ..context };
@@ -214,7 +221,11 @@ impl<'a> SceneReader<'a> {
                 let color = self.reflectance(object, "reflectance", 0.5, context);
                 object.property("use_fast_approx");
                 object.property("alpha");
-                self.notes.substitute_light("`roughdiffuse`", "replaced by `diffuse`", object.span.clone());
+                self.notes.substitute_changing_lighting(
+                    "`roughdiffuse`",
+                    "replaced by `diffuse`",
+                    object.span.clone(),
+                );
                 Some(MaterialBuilder::one_sided("phong", vec![("diffuse", color)]))
             }
             "conductor" | "roughconductor" => self.conductor(object, context),
@@ -230,7 +241,7 @@ impl<'a> SceneReader<'a> {
             "normalmap" => self.normal_map(object, context),
             "principled" => Some(self.principled(object, context)),
             "principledthin" => {
-                self.notes.substitute_light(
+                self.notes.substitute_changing_lighting(
                     "`principledthin`",
                     "rendered as `principled`",
                     object.span.clone(),
@@ -243,12 +254,12 @@ impl<'a> SceneReader<'a> {
                 Some(MaterialBuilder::new("phong", keys))
             }
             "null" => Some(MaterialBuilder { is_invisible: true, ..MaterialBuilder::default() }),
-            "hair" => return self.refused(object, "hair"),
+            "hair" => return self.refuse_bsdf(object, "hair"),
             "pplastic" | "polarizer" | "retarder" | "circular" | "measured_polarized" => {
-                return self.refused(object, "polarization");
+                return self.refuse_bsdf(object, "polarization");
             }
-            "measured" => return self.refused(object, "measured BSDFs"),
-            "hk" | "irawan" => return self.refused(object, "this BSDF"),
+            "measured" => return self.refuse_bsdf(object, "measured BSDFs"),
+            "hk" | "irawan" => return self.refuse_bsdf(object, "this BSDF"),
             _ => {
                 self.unknown_plugin(object, "BSDF", &KNOWN_BSDFS);
                 None
@@ -266,7 +277,7 @@ impl<'a> SceneReader<'a> {
         })
     }
 
-    fn refused(&mut self, object: &PluginInstance, what: &str) -> Option<MaterialBuilder> {
+    fn refuse_bsdf(&mut self, object: &PluginInstance, what: &str) -> Option<MaterialBuilder> {
         self.refuse(object, what);
         None
     }
@@ -291,7 +302,7 @@ impl<'a> SceneReader<'a> {
                 match self.texture_with_factor(texture, MitsubaTextureUse::Color, context.uv, factor) {
                     Some(name) => BuiltValue::Table(vec![("texture", name.into())]),
                     None => {
-                        let color = self.constant_of_texture(texture, ColorRole::Reflectance);
+                        let color = self.color_if_spectrum(texture, ColorRole::Reflectance);
                         shorten_color(color.unwrap_or(DVec3::splat(0.5)) * factor)
                     }
                 }
@@ -300,13 +311,13 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Converts a number or texture to the value of a number key.
-    fn number_value(&mut self, number: NumberSource, context: BsdfContext) -> BuiltValue {
+    fn value_from_number_source(&mut self, number: NumberSource, context: BsdfContext) -> BuiltValue {
         match number {
             NumberSource::Constant(number) => shorten_number(number.clamp(0.0, 1.0)).into(),
             NumberSource::Texture(texture) => match self.number_texture(texture, context.uv) {
                 Some(value) => value,
                 None => {
-                    let color = self.constant_of_texture(texture, ColorRole::Reflectance);
+                    let color = self.color_if_spectrum(texture, ColorRole::Reflectance);
                     shorten_number(color.map_or(0.5, luminance).clamp(0.0, 1.0)).into()
                 }
             },

@@ -18,7 +18,7 @@ impl<'a> SceneReader<'a> {
         let nested = self.children_of_kind(object, ObjectKind::Bsdf).next();
         if nested.is_none() {
             let message = format!("`{}` needs a nested BSDF", shorten(&object.plugin));
-            self.error(object.span.clone(), message, None);
+            self.report_error(object.span.clone(), message, None);
         }
         nested
     }
@@ -33,7 +33,7 @@ impl<'a> SceneReader<'a> {
             && second.target != nested.target
         {
             let text = "the first BSDF is used on both sides";
-            self.notes.substitute_light("`twosided` with two BSDFs", text, object.span.clone());
+            self.notes.substitute_changing_lighting("`twosided` with two BSDFs", text, object.span.clone());
         }
         let context = BsdfContext { is_two_sided: true, ..context };
         let built = self.bsdf(nested.target, context)?;
@@ -41,7 +41,7 @@ impl<'a> SceneReader<'a> {
     }
 
     pub(super) fn mask(&mut self, index: ObjectIndex, context: BsdfContext) -> Option<MaterialBuilder> {
-        let object = self.object(index);
+        let object = self.object_by_index(index);
         let nested = self.nested_bsdf(object)?;
         let opacity = self.fraction(object, "opacity", 0.5);
         if opacity == NumberSource::Constant(1.0) {
@@ -49,7 +49,7 @@ impl<'a> SceneReader<'a> {
         }
         if context.mask.is_some() {
             let text = "the inner mask is ignored";
-            self.notes.substitute_light("`mask` around another mask", text, object.span.clone());
+            self.notes.substitute_changing_lighting("`mask` around another mask", text, object.span.clone());
             return self.bsdf(nested.target, context);
         }
         let context = BsdfContext { mask: Some(index), ..context };
@@ -63,16 +63,16 @@ impl<'a> SceneReader<'a> {
 
     /// Adds the opacity of the mask that contains a material.
     pub(super) fn add_opacity(&mut self, built: &mut MaterialBuilder, context: BsdfContext) {
-        let Some(object) = context.mask.map(|index| self.object(index)) else { return };
+        let Some(object) = context.mask.map(|index| self.object_by_index(index)) else { return };
         if built.is_glass && !built.has("thin") || built.has("opacity") {
             let text = "the mask is ignored";
-            self.notes.substitute_light("`mask` around solid glass", text, object.span.clone());
+            self.notes.substitute_changing_lighting("`mask` around solid glass", text, object.span.clone());
             return;
         }
         let text = "light from point, spot and directional lights passes through them; Mitsuba blocks it";
         self.notes.note("masks", text, object.span.clone());
-        let opacity = self.number(object, "opacity", 0.5);
-        let value = self.number_value(opacity, context);
+        let opacity = self.number_or_texture(object, "opacity", 0.5);
+        let value = self.value_from_number_source(opacity, context);
         built.keys.push(("opacity", value));
     }
 
@@ -89,11 +89,11 @@ impl<'a> SceneReader<'a> {
         }
         let [first, second] = nested[..] else {
             let message = format!("`blendbsdf` needs two nested BSDFs, found {}", nested.len());
-            self.error(object.span.clone(), message, None);
+            self.report_error(object.span.clone(), message, None);
             return None;
         };
         let weight = self.fraction(object, "weight", 0.5);
-        let weight = self.number_value(weight, context);
+        let weight = self.value_from_number_source(weight, context);
         let mut names = Vec::new();
         for child in [first, second] {
             names.push(BuiltValue::from(self.blend_part(object, child, context)?));
@@ -129,7 +129,7 @@ impl<'a> SceneReader<'a> {
             return None;
         }
         let mut built = self.bsdf(child.target, context)?;
-        let inner = self.object(child.target);
+        let inner = self.object_by_index(child.target);
         if built.is_glass && !built.has("thin") {
             self.refuse(blend, "blends that contain solid glass");
             return None;
@@ -149,11 +149,11 @@ impl<'a> SceneReader<'a> {
     }
 
     pub(super) fn coating(&mut self, index: ObjectIndex, context: BsdfContext) -> Option<MaterialBuilder> {
-        let object = self.object(index);
+        let object = self.object_by_index(index);
         let nested = self.nested_bsdf(object)?;
         if context.coat.is_some() {
             let text = "the inner coat is ignored";
-            self.notes.substitute_light("a coat on another coat", text, object.span.clone());
+            self.notes.substitute_changing_lighting("a coat on another coat", text, object.span.clone());
             return self.bsdf(nested.target, context);
         }
         let context = BsdfContext { coat: Some(index), ..context };
@@ -180,10 +180,10 @@ impl<'a> SceneReader<'a> {
 
     /// Adds the coat of the `coating` that contains a material.
     fn add_coat(&mut self, built: &mut MaterialBuilder, context: BsdfContext) {
-        let Some(object) = context.coat.map(|index| self.object(index)) else { return };
+        let Some(object) = context.coat.map(|index| self.object_by_index(index)) else { return };
         if built.is_glass {
             let text = "the coat is ignored";
-            self.notes.substitute_light("a coat on glass", text, object.span.clone());
+            self.notes.substitute_changing_lighting("a coat on glass", text, object.span.clone());
             return;
         }
         let text = "interreflections between coat and base differ";
@@ -210,7 +210,11 @@ impl<'a> SceneReader<'a> {
             }
             ColorSource::Constant(_) => {}
             ColorSource::Texture(_) => {
-                self.notes.substitute_light("a textured `sigma_a`", "replaced by 0", object.span.clone());
+                self.notes.substitute_changing_lighting(
+                    "a textured `sigma_a`",
+                    "replaced by 0",
+                    object.span.clone(),
+                );
             }
         }
     }
@@ -220,7 +224,7 @@ impl<'a> SceneReader<'a> {
         let texture = self.children_of_kind(object, ObjectKind::Texture).next();
         if texture.is_none() {
             let message = format!("`{}` needs a nested texture", shorten(&object.plugin));
-            self.error(object.span.clone(), message, None);
+            self.report_error(object.span.clone(), message, None);
         }
         texture.map(|child| child.target)
     }
@@ -235,8 +239,8 @@ impl<'a> SceneReader<'a> {
         let mut scale = self.float(object, "scale").unwrap_or(1.0);
         // Version 0.6 wraps the texture in a `scale` texture to scale it.
         let mut texture = texture;
-        while self.object(texture).plugin == "scale" {
-            let outer = self.object(texture);
+        while self.object_by_index(texture).plugin == "scale" {
+            let outer = self.object_by_index(texture);
             scale *= self.float(outer, "scale").or_else(|| self.float(outer, "value")).unwrap_or(1.0);
             let Some(inner) = self.children_of_kind(outer, ObjectKind::Texture).next() else { break };
             texture = inner.target;
@@ -244,7 +248,7 @@ impl<'a> SceneReader<'a> {
         let mut built = self.bsdf(nested.target, context)?;
         if built.is_blend || built.is_invisible || built.has("bump") {
             let text = "the bump map is ignored";
-            self.notes.substitute_light(
+            self.notes.substitute_changing_lighting(
                 "`bumpmap` around a blend or another bump map",
                 text,
                 object.span.clone(),
@@ -266,7 +270,8 @@ impl<'a> SceneReader<'a> {
         context: BsdfContext,
     ) -> Option<MaterialBuilder> {
         let nested = self.nested_bsdf(object)?;
-        if let Some(constant) = object.named_child("normalmap").map(|child| self.object(child.target))
+        if let Some(constant) =
+            object.named_child("normalmap").map(|child| self.object_by_index(child.target))
             && constant.plugin == "rawconstant"
         {
             self.note_constant_normal_map(constant);
@@ -279,14 +284,14 @@ impl<'a> SceneReader<'a> {
         let mut built = self.bsdf(nested.target, context)?;
         if built.is_blend || built.is_invisible || built.has("normal_map") {
             let text = "the normal map is ignored";
-            self.notes.substitute_light(
+            self.notes.substitute_changing_lighting(
                 "`normalmap` around a blend or another normal map",
                 text,
                 object.span.clone(),
             );
             return Some(built);
         }
-        if let Some(name) = self.texture(texture, MitsubaTextureUse::Normal, context.uv) {
+        if let Some(name) = self.find_or_add_texture(texture, MitsubaTextureUse::Normal, context.uv) {
             built.keys.push(("normal_map", name.into()));
             let text = "light fades as the normal tilts: 2 % darker at 7 degrees";
             self.notes.note("bump and normal maps", text, object.span.clone());
@@ -298,7 +303,11 @@ impl<'a> SceneReader<'a> {
     pub(super) fn note_constant_normal_map(&mut self, constant: &'a PluginInstance) {
         let value = constant.property("value").map(|property| &property.value);
         if value != Some(&PropertyValue::Vector(DVec3::new(0.5, 0.5, 1.0))) {
-            self.notes.substitute_light("a constant normal map", "ignored", constant.span.clone());
+            self.notes.substitute_changing_lighting(
+                "a constant normal map",
+                "ignored",
+                constant.span.clone(),
+            );
         }
     }
 }

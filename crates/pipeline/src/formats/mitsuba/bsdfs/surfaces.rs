@@ -4,7 +4,7 @@ use super::{AIR, BsdfContext, MaterialBuilder};
 use crate::choice::Choice;
 use crate::formats::foreign::import::TableEntries;
 use crate::formats::foreign::ior::{dielectric_ior, dielectric_names};
-use crate::formats::foreign::spectra::flat_emission_color;
+use crate::formats::foreign::spectra::equal_energy_emission_color;
 use crate::formats::mitsuba::graph::PluginInstance;
 use crate::formats::mitsuba::plastic::{PlasticCoat, remapped_reflectance};
 use crate::formats::mitsuba::property::PropertyValue;
@@ -23,7 +23,7 @@ impl<'a> SceneReader<'a> {
         let scale = self.color(object, name, ColorRole::Reflectance, 1.0);
         if scale != ColorSource::Constant(DVec3::ONE) {
             let subject = format!("`{name}` of `{}`", shorten(&object.plugin));
-            self.notes.substitute_light(&subject, "replaced by 1", span_of(object, name));
+            self.notes.substitute_changing_lighting(&subject, "replaced by 1", span_of(object, name));
         }
     }
 
@@ -32,7 +32,7 @@ impl<'a> SceneReader<'a> {
         let Some(property) = object.property(name) else { return default };
         let PropertyValue::Text(substance) = &property.value else {
             return self.float(object, name).filter(|ior| *ior > 0.0).unwrap_or_else(|| {
-                self.error(property.span.clone(), "the index of refraction must be above 0", None);
+                self.report_error(property.span.clone(), "the index of refraction must be above 0", None);
                 default
             });
         };
@@ -45,7 +45,7 @@ impl<'a> SceneReader<'a> {
                     dielectric_names().collect::<Vec<_>>().join(", ")
                 ),
             };
-            self.error(
+            self.report_error(
                 property.span.clone(),
                 format!("unknown substance `{}`", shorten(substance)),
                 Some(help),
@@ -60,7 +60,7 @@ impl<'a> SceneReader<'a> {
         let outside = self.ior(object, "ext_ior", AIR);
         let ratio = inside / outside;
         if !(0.1..=10.0).contains(&ratio) {
-            self.error(
+            self.report_error(
                 object.span.clone(),
                 "the ratio of the indices of refraction must be between 0.1 and 10",
                 None,
@@ -83,21 +83,25 @@ impl<'a> SceneReader<'a> {
             .iter()
             .any(|name| object.property(name).is_some() || object.named_child(name).is_some());
         if !has_pair {
-            let alpha = self.number(object, "alpha", default_alpha);
+            let alpha = self.number_or_texture(object, "alpha", default_alpha);
             let roughness = self.roughness_value(alpha, object, context);
             keys.push(("roughness", roughness));
             return;
         }
-        let across = self.number(object, "alpha_u", default_alpha);
-        let along = self.number(object, "alpha_v", default_alpha);
+        let across = self.number_or_texture(object, "alpha_u", default_alpha);
+        let along = self.number_or_texture(object, "alpha_v", default_alpha);
         match (across, along) {
             (NumberSource::Constant(u), NumberSource::Constant(v)) => {
-                self.add_alpha_pair(keys, object, [u, v], may_be_anisotropic);
+                self.add_roughness_from_alphas(keys, object, [u, v], may_be_anisotropic);
             }
             (NumberSource::Texture(_) | NumberSource::Constant(_), _) => {
                 let one = if matches!(across, NumberSource::Texture(_)) { across } else { along };
                 let text = "one of them is used as isotropic roughness";
-                self.notes.substitute_light("textured `alpha_u` and `alpha_v`", text, object.span.clone());
+                self.notes.substitute_changing_lighting(
+                    "textured `alpha_u` and `alpha_v`",
+                    text,
+                    object.span.clone(),
+                );
                 let roughness = self.roughness_value(one, object, context);
                 keys.push(("roughness", roughness));
             }
@@ -117,7 +121,7 @@ impl<'a> SceneReader<'a> {
             }
             Some((other, span)) => {
                 let help = "expected beckmann or ggx".to_owned();
-                self.error(span, format!("unknown distribution `{}`", shorten(other)), Some(help));
+                self.report_error(span, format!("unknown distribution `{}`", shorten(other)), Some(help));
             }
         }
     }
@@ -135,7 +139,7 @@ impl<'a> SceneReader<'a> {
             NumberSource::Texture(texture) => match self.roughness_texture(texture, context.uv) {
                 Some(value) => value,
                 None => {
-                    let color = self.constant_of_texture(texture, ColorRole::Reflectance);
+                    let color = self.color_if_spectrum(texture, ColorRole::Reflectance);
                     let alpha = color.map_or(0.1, luminance);
                     let _ = object;
                     shorten_number(libm::sqrt(alpha.clamp(1e-4, 1.0))).into()
@@ -183,18 +187,19 @@ impl<'a> SceneReader<'a> {
             let Some(conductor) = known else {
                 let near = nearest_name(name, NamedConductor::ALL.iter().map(|one| one.name()));
                 let help = near.map(|near| format!("did you mean `{near}`?"));
-                self.error(span, format!("unknown conductor `{}`", shorten(name)), help);
+                self.report_error(span, format!("unknown conductor `{}`", shorten(name)), help);
                 return None;
             };
             // Mitsuba integrates η and k like emission spectra.
-            let [eta, k] = conductor.complex_ior().map(|value| value.as_dvec3() * flat_emission_color());
+            let [eta, k] =
+                conductor.complex_ior().map(|value| value.as_dvec3() * equal_energy_emission_color());
             keys.push(("eta", shorten_vector(eta).into()));
             keys.push(("k", shorten_vector(k).into()));
         }
         if let Some(outside) = object.property("ext_eta").map(|_| self.ior(object, "ext_eta", AIR))
             && (outside - AIR).abs() > 1e-3
         {
-            self.notes.substitute_light(
+            self.notes.substitute_changing_lighting(
                 "`ext_eta` of a conductor",
                 "replaced by air",
                 span_of(object, "ext_eta"),
@@ -213,11 +218,11 @@ impl<'a> SceneReader<'a> {
             keys.push(("roughness", 0.0.into()));
         }
         let metal = MaterialBuilder::one_sided("metal", keys);
-        Some(self.scaled_metal(metal, scale, object, context))
+        Some(self.scale_metal_by_blending(metal, scale, object, context))
     }
 
     /// Scales the reflectance of a metal by blending it with black, which is exact for a gray scale.
-    pub(super) fn scaled_metal(
+    pub(super) fn scale_metal_by_blending(
         &mut self,
         mut metal: MaterialBuilder,
         scale: ColorSource,
@@ -232,7 +237,7 @@ impl<'a> SceneReader<'a> {
                 }
                 if color.max_element() - color.min_element() > 2e-3 {
                     let text = "replaced by its luminance";
-                    self.notes.substitute_light(
+                    self.notes.substitute_changing_lighting(
                         "a colored `specular_reflectance`",
                         text,
                         span_of(object, "specular_reflectance"),
@@ -243,7 +248,7 @@ impl<'a> SceneReader<'a> {
             ColorSource::Texture(texture) => match self.number_texture(texture, context.uv) {
                 Some(value) => {
                     let text = "replaced by its luminance";
-                    self.notes.substitute_light(
+                    self.notes.substitute_changing_lighting(
                         "a textured `specular_reflectance`",
                         text,
                         span_of(object, "specular_reflectance"),
@@ -306,7 +311,7 @@ impl<'a> SceneReader<'a> {
         let mut keys: TableEntries = vec![("ior", shorten_number(ior).into())];
         let alpha = if object.plugin == "roughplastic" {
             let (mut distribution, mut alpha) = (TableEntries::new(), 0.1);
-            if let NumberSource::Constant(constant) = self.number(object, "alpha", 0.1) {
+            if let NumberSource::Constant(constant) = self.number_or_texture(object, "alpha", 0.1) {
                 alpha = constant.clamp(1e-4, 1.0);
             }
             self.add_distribution(&mut distribution, object, 0.1, context, false);
@@ -317,7 +322,7 @@ impl<'a> SceneReader<'a> {
             None
         };
         let is_beckmann = keys.iter().any(|(key, _)| *key == "distribution");
-        let coat = self.plastic_coat(ior, alpha, is_beckmann);
+        let coat = self.cached_plastic_coat(ior, alpha, is_beckmann);
         match self.color(object, "diffuse_reflectance", ColorRole::Reflectance, 0.5) {
             ColorSource::Constant(color) => {
                 let remapped =
@@ -343,7 +348,12 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Returns the integrals of a coat, cached by its parameters.
-    pub(super) fn plastic_coat(&mut self, ior: f64, alpha: Option<f64>, is_beckmann: bool) -> PlasticCoat {
+    pub(super) fn cached_plastic_coat(
+        &mut self,
+        ior: f64,
+        alpha: Option<f64>,
+        is_beckmann: bool,
+    ) -> PlasticCoat {
         let key = (ior.to_bits(), alpha.map(f64::to_bits), is_beckmann);
         *self.plastic_coats.entry(key).or_insert_with(|| PlasticCoat::new(ior, alpha, is_beckmann))
     }
@@ -351,10 +361,14 @@ impl<'a> SceneReader<'a> {
     pub(super) fn phong(&mut self, object: &'a PluginInstance, context: BsdfContext) -> MaterialBuilder {
         let diffuse = self.reflectance(object, "diffuse_reflectance", 0.5, context);
         let specular = self.reflectance(object, "specular_reflectance", 0.2, context);
-        let exponent = match self.number(object, "exponent", 30.0) {
+        let exponent = match self.number_or_texture(object, "exponent", 30.0) {
             NumberSource::Constant(exponent) => exponent.clamp(0.0, 1e6),
             NumberSource::Texture(_) => {
-                self.notes.substitute_light("a textured `exponent`", "replaced by 30", object.span.clone());
+                self.notes.substitute_changing_lighting(
+                    "a textured `exponent`",
+                    "replaced by 30",
+                    object.span.clone(),
+                );
                 30.0
             }
         };
@@ -367,7 +381,7 @@ impl<'a> SceneReader<'a> {
     }
 
     pub(super) fn ward(&mut self, object: &'a PluginInstance, context: BsdfContext) -> MaterialBuilder {
-        self.notes.substitute_light(
+        self.notes.substitute_changing_lighting(
             "`ward`",
             "replaced by Phong with a highlight of the same width",
             object.span.clone(),
@@ -379,7 +393,7 @@ impl<'a> SceneReader<'a> {
             NumberSource::Constant(alpha) => alpha.clamp(1e-3, 1.0),
             NumberSource::Texture(_) => 0.1,
         };
-        let [u, v] = ["alpha_u", "alpha_v"].map(|name| constant(self.number(object, name, 0.1)));
+        let [u, v] = ["alpha_u", "alpha_v"].map(|name| constant(self.number_or_texture(object, name, 0.1)));
         let shininess = (2.0 / (u * v) - 2.0).clamp(0.0, 1e6);
         let keys = vec![
             ("diffuse", diffuse),
@@ -394,11 +408,11 @@ impl<'a> SceneReader<'a> {
         for (name, key, default) in
             [("metallic", "metallic", 0.0), ("roughness", "roughness", 0.5), ("clearcoat", "clearcoat", 0.0)]
         {
-            let number = self.number(object, name, default);
-            let value = self.number_value(number, context);
+            let number = self.number_or_texture(object, name, default);
+            let value = self.value_from_number_source(number, context);
             keys.push((key, value));
         }
-        let gloss = match self.number(object, "clearcoat_gloss", 0.0) {
+        let gloss = match self.number_or_texture(object, "clearcoat_gloss", 0.0) {
             NumberSource::Constant(gloss) => gloss.clamp(0.0, 1.0),
             NumberSource::Texture(_) => 0.0,
         };
@@ -414,15 +428,15 @@ impl<'a> SceneReader<'a> {
             }
         };
         keys.push(("ior", shorten_number(ior.clamp(1.0, 10.0)).into()));
-        let has_sheen = self.number(object, "sheen", 0.0) != NumberSource::Constant(0.0);
+        let has_sheen = self.number_or_texture(object, "sheen", 0.0) != NumberSource::Constant(0.0);
         for name in
             ["anisotropic", "spec_trans", "spec_tint", "sheen", "sheen_tint", "flatness", "diff_trans"]
         {
-            let is_zero = matches!(self.number(object, name, 0.0), NumberSource::Constant(0.0));
+            let is_zero = matches!(self.number_or_texture(object, name, 0.0), NumberSource::Constant(0.0));
             // The tint of a sheen that is 0 has no effect.
             if !is_zero && (name != "sheen_tint" || has_sheen) {
                 let subject = format!("`{name}` of `{}`", object.plugin);
-                self.notes.substitute_light(&subject, "ignored", span_of(object, name));
+                self.notes.substitute_changing_lighting(&subject, "ignored", span_of(object, name));
             }
         }
         for name in [
@@ -433,13 +447,13 @@ impl<'a> SceneReader<'a> {
         ] {
             object.property(name);
         }
-        let has_coat = self.number(object, "clearcoat", 0.0) != NumberSource::Constant(0.0);
+        let has_coat = self.number_or_texture(object, "clearcoat", 0.0) != NumberSource::Constant(0.0);
         if has_coat {
             let text = "rendered with glimt's coat, which is up to 14 % darker";
-            self.notes.substitute_light("`clearcoat` of `principled`", text, object.span.clone());
+            self.notes.substitute_changing_lighting("`clearcoat` of `principled`", text, object.span.clone());
         }
         // Pure metals match Mitsuba's.
-        if self.number(object, "metallic", 0.0) != NumberSource::Constant(1.0) {
+        if self.number_or_texture(object, "metallic", 0.0) != NumberSource::Constant(1.0) {
             let text = "about 2 % darker, because glimt's diffuse lobe is under a dielectric coat";
             self.notes.note("`principled`", text, object.span.clone());
         }

@@ -132,11 +132,11 @@ pub(super) fn parse<'a>(
         object: None,
         object_names: HashSet::new(),
         shape_count: 0,
-        open_files: vec![canonical(path)],
+        open_files: vec![canonical_path(path)],
     };
     parser.statements.materials.push(default_material());
     let end = parser.parse_text(&text, base)?;
-    parser.finish(end);
+    parser.check_is_complete(end);
     Ok(parser)
 }
 
@@ -145,7 +145,7 @@ fn default_material() -> Entity {
     Entity { kind, parameters: Parameters::default(), color_space: ColorSpace::Srgb }
 }
 
-fn canonical(path: &Path) -> PathBuf {
+fn canonical_path(path: &Path) -> PathBuf {
     path.canonicalize().unwrap_or_else(|_| path.to_owned())
 }
 
@@ -182,11 +182,11 @@ impl Parser<'_> {
                 }
             }
         }
-        Ok(lexer.end())
+        Ok(lexer.end_span())
     }
 
     /// Checks for unclosed blocks and a missing `WorldBegin`.
-    fn finish(&mut self, end: Range<usize>) {
+    fn check_is_complete(&mut self, end: Range<usize>) {
         if !self.errors.is_empty() {
             return;
         }
@@ -214,7 +214,7 @@ impl Parser<'_> {
             Err(error) => return Ok(Err(error)),
         };
         let path = self.folder.join(&name.text);
-        let identity = canonical(&path);
+        let identity = canonical_path(&path);
         let error = |message: String| Ok(Err(PbrtError::new(name.span.clone(), message)));
         if self.open_files.contains(&identity) {
             return error(format!("{} includes itself", escape_and_truncate(&name.text, 60)));
@@ -307,7 +307,7 @@ impl Parser<'_> {
         target: AttributeTarget,
     ) -> PbrtResult<Entity> {
         let mut entity = self.entity_without_defaults(directive, lexer)?;
-        entity.parameters.add_defaults(self.state.defaults(target));
+        entity.parameters.add_defaults(self.state.default_parameters(target));
         Ok(entity)
     }
 
@@ -366,7 +366,7 @@ impl Parser<'_> {
             let near = nearest_name(&kind.text, AttributeTarget::NAMES.iter().map(|(name, _)| *name));
             return Err(PbrtError::new(kind.span, "unknown attribute target").with_suggestion(near));
         };
-        self.state.add_defaults(*target, parameters)
+        self.state.store_attribute_defaults(*target, parameters)
     }
 
     fn color_space(&mut self, directive: &Token<'_>, lexer: &mut Lexer<'_>) -> PbrtResult<()> {

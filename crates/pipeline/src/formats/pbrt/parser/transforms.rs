@@ -15,7 +15,7 @@ impl Parser<'_> {
     ) -> PbrtResult<()> {
         let span = &directive.span;
         match &*directive.text {
-            "Identity" => self.state.change(|_| DMat4::IDENTITY),
+            "Identity" => self.state.map_active_transforms(|_| DMat4::IDENTITY),
             "Translate" => {
                 let offset = DVec3::from(numbers(directive, lexer)?);
                 self.state.concat(DMat4::from_translation(offset));
@@ -34,7 +34,7 @@ impl Parser<'_> {
             }
             "Transform" => {
                 let matrix = bracketed_matrix(directive, lexer)?;
-                self.state.change(|_| matrix);
+                self.state.map_active_transforms(|_| matrix);
             }
             "ConcatTransform" => {
                 let matrix = bracketed_matrix(directive, lexer)?;

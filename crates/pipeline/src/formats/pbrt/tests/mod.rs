@@ -7,7 +7,7 @@ mod fuzz;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use super::read;
+use super::read_glimt_scene;
 use crate::assets::mesh::load_from_bytes;
 use crate::control::{CancelToken, ignore_progress};
 use crate::formats::foreign::{ForeignError, ForeignOptions};
@@ -54,7 +54,7 @@ pub(super) fn read_path(path: &Path, options: &ForeignOptions) -> Result<Foreign
     let (containers, token) = (GltfContainers::default(), CancelToken::new());
     let view = ModelViewOptions::default();
     let context = ForeignReadContext { view, options, containers: &containers, token: &token };
-    read(path, &context).map_err(|error| match error {
+    read_glimt_scene(path, &context).map_err(|error| match error {
         ForeignError::Asset(error) => panic!("{error}"),
         ForeignError::Scene { diagnostics, .. } => diagnostics,
     })

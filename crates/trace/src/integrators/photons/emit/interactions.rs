@@ -67,7 +67,7 @@ impl<'a> PathStepper<'a> for PhotonWavefront<'a> {
     ) -> NullInteractionOutcome {
         let reflectance = pane.reflectance(vertex.surface.shading_normal.dot(vertex.wo));
         let tint = vertex.pane_transmittance(path, pane, &mut self.counters.texture_lookups);
-        if !self.may_scatter() {
+        if !self.is_below_max_depth() {
             return NullInteractionOutcome::Passed(tint * (1.0 - reflectance));
         }
         if !self.tracing.tile.chooses_reflection(path, reflectance) {
@@ -99,7 +99,7 @@ impl PhotonWavefront<'_> {
             Bsdf::SpecularOverBase(layers) => {
                 self.store_and_reflect_at_specular_over_base(path, vertex, layers, (far, lacks_photons));
             }
-            Bsdf::Mirror(mirror) if self.may_scatter() => {
+            Bsdf::Mirror(mirror) if self.is_below_max_depth() => {
                 let shading = vertex.perturbed_and_smooth_normals(&mut self.counters);
                 let reflectance = vertex.mirror_reflectance(mirror, &shading, true, &mut self.counters);
                 let ray = reflected_path(path, vertex, &shading, reflectance);
@@ -128,7 +128,7 @@ impl PhotonWavefront<'_> {
             let factor = (!is_reflected).then(|| 1.0 / (1.0 - probability));
             self.store_and_scatter_at_rough(path, vertex, &layers.base, (far, factor));
         }
-        if is_reflected && self.may_scatter() {
+        if is_reflected && self.is_below_max_depth() {
             let specular = vertex.specular_sample_weight(layers, &lobe, &mut self.counters);
             let part = if chooses { 1.0 } else { probability };
             let ray = reflected_path(path, vertex, &shading, specular * part);
@@ -173,7 +173,8 @@ impl PhotonWavefront<'_> {
     ) {
         let tile = self.tracing.tile;
         self.store_at_vertex(path, vertex);
-        let Some(factor) = scattered.filter(|_| path.state.only_specular_before && self.may_scatter()) else {
+        let Some(factor) = scattered.filter(|_| path.state.only_specular_before && self.is_below_max_depth())
+        else {
             return;
         };
         // Queue the photon for scattering.
@@ -217,7 +218,7 @@ impl PhotonWavefront<'_> {
     }
 
     fn shade_glass_hit(&mut self, path: &PathRay, vertex: &SurfaceVertex<'_>, far: &InteriorList) {
-        if !self.may_scatter() {
+        if !self.is_below_max_depth() {
             return;
         }
         let tile = self.tracing.tile;

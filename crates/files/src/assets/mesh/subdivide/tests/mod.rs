@@ -6,7 +6,7 @@ mod seams;
 use std::collections::BTreeMap;
 
 use super::*;
-use crate::assets::rejection;
+use crate::assets::expect_rejection;
 
 /// A mesh without attributes.
 fn mesh(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> TriangleMesh {
@@ -165,7 +165,7 @@ fn results_do_not_depend_on_thread_count() {
 fn too_many_triangles_are_rejected_early() {
     // 2²⁷ triangles are the limit. 40,000 triangles at level 6 are more.
     let many = grid(200, 100, |[x, y]| [x, y, 0.0]);
-    let (line, message) = rejection(try_subdivide(&many, 6));
+    let (line, message) = expect_rejection(try_subdivide(&many, 6));
     assert_eq!((line, &message), (None, &too_many_triangles_message(40_000, 6, 5)));
     assert!(message.contains("163840000") && message.ends_with("use `subdivide = 5`"), "{message}");
 }

@@ -40,7 +40,7 @@ pub fn closest_hit_if_coherent<V: SimdVector>(
             Child::Inner(index) => {
                 let node = &tree.nodes[index as usize];
                 let (near, hit_boxes) = frustum.box_entries(node, like8.splat_like(end));
-                push_children_ordered(tree, node, near, hit_boxes, &mut stack, &packet, best.t * pad);
+                push_children_farthest_first(tree, node, near, hit_boxes, &mut stack, &packet, best.t * pad);
             }
             Child::Leaf { first, count } => {
                 let mut any = 0;
@@ -64,7 +64,7 @@ pub fn closest_hit_if_coherent<V: SimdVector>(
 
 /// Pushes the children that any ray hits, farthest first, so that the nearest is on top.
 #[inline(always)]
-fn push_children_ordered<V: SimdVector>(
+fn push_children_farthest_first<V: SimdVector>(
     tree: &WideBvh,
     node: &WideNode,
     near: SimdF32x8,
