@@ -179,7 +179,18 @@ impl<'a> SceneReader<'a> {
     /// Returns the value of a number key that reads a texture.
     pub(super) fn number_texture(&mut self, index: ObjectIndex, uv: UvConvention) -> Option<BuiltValue> {
         let name = self.find_or_add_texture(index, MitsubaTextureUse::Number, uv)?;
-        Some(self.number_texture_value(index, name))
+        Some(BuiltValue::Table(vec![("texture", name.into())]))
+    }
+
+    /// Returns the value of `opacity` for a texture. Selects the red channel if the image may have alpha, which
+    /// `opacity` would read: Mitsuba takes the luminance, and masks are gray.
+    pub(super) fn opacity_texture(&mut self, index: ObjectIndex, uv: UvConvention) -> Option<BuiltValue> {
+        let name = self.find_or_add_texture(index, MitsubaTextureUse::Number, uv)?;
+        let mut entries = vec![("texture", name.into())];
+        if self.image_may_have_alpha(self.object_by_index(index)) {
+            entries.push(("channel", "r".into()));
+        }
+        Some(BuiltValue::Table(entries))
     }
 
     /// Returns the value of `roughness`, which is √α, for a texture of α.
@@ -199,18 +210,6 @@ impl<'a> SceneReader<'a> {
     pub(super) fn height_texture(&mut self, index: ObjectIndex, uv: UvConvention) -> Option<BuiltValue> {
         let name = self.find_or_add_texture(index, MitsubaTextureUse::Number, uv)?;
         Some(name.into())
-    }
-
-    /// Returns the value of a number key that reads the texture `name`. Selects the red channel if the image
-    /// may have alpha, which `opacity` reads by default.
-    fn number_texture_value(&mut self, index: ObjectIndex, name: String) -> BuiltValue {
-        let object = self.object_by_index(index);
-        let has_alpha = self.image_may_have_alpha(object);
-        let mut entries = vec![("texture", name.into())];
-        if has_alpha {
-            entries.push(("channel", "r".into()));
-        }
-        BuiltValue::Table(entries)
     }
 
     /// Whether an image may have an alpha channel, from the color type of a PNG file or the file extension.

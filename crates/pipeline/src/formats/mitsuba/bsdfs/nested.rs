@@ -72,7 +72,7 @@ impl<'a> SceneReader<'a> {
         let text = "light from point, spot and directional lights passes through them; Mitsuba blocks it";
         self.notes.note("masks", text, object.span.clone());
         let opacity = self.number_or_texture(object, "opacity", 0.5);
-        let value = self.value_from_number_source(opacity, context);
+        let value = self.opacity_from_number_source(opacity, context);
         built.keys.push(("opacity", value));
     }
 

@@ -55,6 +55,17 @@ fn images_of_masks_are_watched() {
 }
 
 #[test]
+fn weights_are_luminances_despite_alpha() {
+    let bench = scene(
+        r#"<shape type="sphere"><bsdf type="blendbsdf"><bsdf type="diffuse"/><bsdf type="conductor"/>
+        <texture type="bitmap" name="weight"><string name="filename" value="a.png"/></texture></bsdf></shape>"#,
+    );
+    bench.write("a.png", png(true));
+    let toml = bench.toml();
+    assert!(toml.contains("weight = { texture = ") && !toml.contains("channel"), "{toml}");
+}
+
+#[test]
 fn all_places_of_missing_files_are_watched() {
     let mesh = "<shape type=\"obj\"><string name=\"filename\" value=\"a.obj\"/></shape>";
     let bench = scene(&format!("<path value=\"p\"/><path value=\"q\"/>{mesh}"));
