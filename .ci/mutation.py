@@ -85,7 +85,7 @@ FAULTS = [
      "formats::mitsuba::tests::files::all_places_of_missing_files_are_watched"),
     ("copied files whose names collide", "formats/mitsuba/assets.rs", "while ⟦!self.used_asset_names.insert(name.clone())⟧ {", "!self.used_asset_names.insert(name.clone()) && next < 3",
      "formats::mitsuba::tests::files::copied_files_have_different_names"),
-    ("mirrored rectangles whose front is reversed", "formats/mitsuba/shapes.rs", "let is_reversed = ⟦is_mirroring(&matrix) != is_flipped⟧;\n        let uv = UvConvention { flips_u: is_reversed", "is_flipped",
+    ("mirrored rectangles whose front is reversed", "formats/mitsuba/shapes.rs", "let is_reversed = ⟦is_mirroring(&matrix) != is_flipped⟧;\n        let uv = UvFlips { flips_u: is_reversed", "is_flipped",
      FACTS + "mirrored_rectangles_keep_their_front"),
     ("attributes of the wrong faces", "formats/mitsuba/mesh_attributes.rs", "DVec2::new((⟦column⟧ + 0.5) / width as f64,", "0.0",
      MITSUBA_FEATURES + "attributes_of_faces_are_images"),

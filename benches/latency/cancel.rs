@@ -4,9 +4,9 @@ use std::path::Path;
 use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 
-use glimt::pipeline::protocol::{Command, Event, MaxPreviewSize, Request};
+use glimt::pipeline::protocol::{Command, Event, PreviewBounds, Request};
 use glimt::pipeline::settings::Overrides;
-use glimt::pipeline::{Handle, start_with_new_channel};
+use glimt::pipeline::{WorkerHandle, start_worker_with_channel};
 
 use super::BenchResult;
 
@@ -18,12 +18,12 @@ const LIMIT: Duration = Duration::from_secs(20);
 pub fn times(scene: &Path) -> BenchResult<Vec<Duration>> {
     let mut times = Vec::new();
     for step in 0..12 {
-        let worker = start_with_new_channel(0)?;
+        let worker = start_worker_with_channel(0)?;
         let mut generation = 0;
         send(&worker.0, scene, &mut generation);
         times.push(cancel(&worker, scene, &mut generation, Duration::from_millis(step * step * 4))?);
     }
-    let worker = start_with_new_channel(0)?;
+    let worker = start_worker_with_channel(0)?;
     let mut generation = 0;
     send(&worker.0, scene, &mut generation);
     while !matches!(worker.1.recv_timeout(LIMIT)?, Event::Preview { .. }) {}
@@ -34,7 +34,7 @@ pub fn times(scene: &Path) -> BenchResult<Vec<Duration>> {
 }
 
 fn cancel(
-    (worker, events): &(Handle, Receiver<Event>),
+    (worker, events): &(WorkerHandle, Receiver<Event>),
     scene: &Path,
     generation: &mut u64,
     after: Duration,
@@ -52,11 +52,11 @@ fn cancel(
 }
 
 /// Requests a different image each time.
-fn send(worker: &Handle, scene: &Path, generation: &mut u64) {
+fn send(worker: &WorkerHandle, scene: &Path, generation: &mut u64) {
     *generation += 1;
     let overrides =
         Overrides { samples: Some(100_000), seed: u32::try_from(*generation).ok(), ..Overrides::default() };
-    let preview = Some(MaxPreviewSize { width: 118, height: 74, around: None });
+    let preview = Some(PreviewBounds { width: 118, height: 74, around: None });
     let request = Request::new(*generation, scene.to_owned(), overrides);
     worker.send(Command::Render(Box::new(Request { preview, ..request })));
 }

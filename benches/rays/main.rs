@@ -26,7 +26,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use embree::{Embree, EmbreeScene};
-use glimt::accel::wide_bvh::{InstructionSet, Quality};
+use glimt::accel::wide_bvh::{BuildQuality, InstructionSet};
 use glimt::accel::{KdTree, PACKET_SIZE, WideBvh, packet_ray_ends};
 use glimt::control::CancelToken;
 use glimt::geometry::Ray;
@@ -117,7 +117,7 @@ fn seconds(run: impl FnOnce()) -> f64 {
 fn measure(name: &str, mesh: &TriangleMesh, embree: Option<&Embree>, options: &BenchOptions) {
     let count = mesh.triangles.len() as u32;
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let quality = if options.high { Quality::High } else { Quality::Medium };
+    let quality = if options.high { BuildQuality::High } else { BuildQuality::Medium };
     let build = || {
         let corners = |id| mesh.corners(id);
         WideBvh::build_with_quality(quality, count, corners, &CancelToken::new())

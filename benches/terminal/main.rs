@@ -22,7 +22,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use glimt::film::Srgb8Image;
-use glimt::pipeline::protocol::MaxPreviewSize;
+use glimt::pipeline::protocol::PreviewBounds;
 use glimt::tui::ColorDepth;
 use glimt::tui::paint::{PacingDecision, PacingInputs, Painter, PreviewFidelity, preview_pacing_decision};
 use ratatui::buffer::Buffer;
@@ -102,7 +102,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 /// Renders a scene and its edited version, and prints a line for each.
 fn replay(edit: &Edit, columns: u16, rows: u16) -> Result<(), Box<dyn Error>> {
-    let size = MaxPreviewSize {
+    let size = PreviewBounds {
         width: u32::from(columns - SIDE_COLUMNS),
         height: 2 * u32::from(rows - OUTER_ROWS),
         around: None,
@@ -114,7 +114,7 @@ fn replay(edit: &Edit, columns: u16, rows: u16) -> Result<(), Box<dyn Error>> {
     }
     // Write the file next to the scenes so that relative paths work.
     let scene = tempfile::Builder::new().prefix("bench").suffix(".toml").tempfile_in(&scenes)?;
-    let worker = glimt::pipeline::start_with_new_channel(0)?;
+    let worker = glimt::pipeline::start_worker_with_channel(0)?;
     let mut window = Window::new(columns, rows);
     for (generation, name, text) in
         [(1, "start", text.clone()), (2, edit.name, text.replace(edit.from, edit.to))]

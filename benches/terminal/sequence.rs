@@ -7,8 +7,8 @@ use std::sync::mpsc::Receiver;
 use std::time::Instant;
 
 use glimt::film::Srgb8Image;
-use glimt::pipeline::Handle;
-use glimt::pipeline::protocol::{Command, Event, MaxPreviewSize, Request};
+use glimt::pipeline::WorkerHandle;
+use glimt::pipeline::protocol::{Command, Event, PreviewBounds, Request};
 use glimt::pipeline::settings::Overrides;
 
 /// A preview of an image, which may still be rendering.
@@ -23,10 +23,10 @@ pub(crate) struct RecordedPreview {
 
 /// Renders the scene and records every preview that the front end receives, including the final image.
 pub(crate) fn render(
-    (handle, events): &(Handle, Receiver<Event>),
+    (handle, events): &(WorkerHandle, Receiver<Event>),
     generation: u64,
     scene: &Path,
-    size: MaxPreviewSize,
+    size: PreviewBounds,
 ) -> Result<Vec<RecordedPreview>, Box<dyn Error>> {
     let request = Request::new(generation, scene.to_owned(), Overrides::default());
     let request = Request { preview: Some(size), ..request };

@@ -5,8 +5,8 @@ use std::sync::mpsc::Receiver;
 use std::sync::{Arc, PoisonError};
 
 use glimt::film::Srgb8Image;
-use glimt::pipeline::Handle;
-use glimt::pipeline::protocol::{Command, Event, MaxPreviewSize, Request};
+use glimt::pipeline::WorkerHandle;
+use glimt::pipeline::protocol::{Command, Event, PreviewBounds, Request};
 use glimt::pipeline::settings::Overrides;
 use glimt::tui::ColorDepth;
 use glimt::tui::paint::{Painter, PreviewFidelity};
@@ -15,26 +15,26 @@ use ratatui::layout::Rect;
 use ratatui::style::Color;
 
 /// Window sizes, and the preview sizes next to the side panel.
-const SIZES: [(Rect, MaxPreviewSize); 3] = [
-    (Rect { x: 0, y: 0, width: 80, height: 24 }, MaxPreviewSize { width: 60, height: 40, around: None }),
-    (Rect { x: 0, y: 0, width: 120, height: 40 }, MaxPreviewSize { width: 90, height: 72, around: None }),
-    (Rect { x: 0, y: 0, width: 200, height: 60 }, MaxPreviewSize { width: 170, height: 112, around: None }),
+const SIZES: [(Rect, PreviewBounds); 3] = [
+    (Rect { x: 0, y: 0, width: 80, height: 24 }, PreviewBounds { width: 60, height: 40, around: None }),
+    (Rect { x: 0, y: 0, width: 120, height: 40 }, PreviewBounds { width: 90, height: 72, around: None }),
+    (Rect { x: 0, y: 0, width: 200, height: 60 }, PreviewBounds { width: 170, height: 112, around: None }),
 ];
 /// Width and height of the film. Larger images have less noise in their previews.
 const FILM: u32 = 320;
 
 /// Renders previews, one scene at a time.
 struct PreviewRenderer {
-    handle: Handle,
+    handle: WorkerHandle,
     events: Receiver<Event>,
-    preview: MaxPreviewSize,
+    preview: PreviewBounds,
     generation: u64,
     folder: tempfile::TempDir,
 }
 
 impl PreviewRenderer {
-    fn new(preview: MaxPreviewSize) -> Self {
-        let (handle, events) = glimt::pipeline::start_with_new_channel(0).expect("a worker");
+    fn new(preview: PreviewBounds) -> Self {
+        let (handle, events) = glimt::pipeline::start_worker_with_channel(0).expect("a worker");
         let folder = tempfile::tempdir().expect("a temporary folder");
         Self { handle, events, preview, generation: 0, folder }
     }

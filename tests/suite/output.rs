@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::time::Duration;
 
-use glimt::output::{OutputError, check_image_target, write::atomic};
+use glimt::output::{OutputError, check_image_target, write::write_atomically};
 use nix::errno::Errno;
 
 use super::test_dir::{assert_mentions, system_error};
@@ -47,7 +47,7 @@ fn names(directory: &Path) -> Vec<String> {
 
 fn refusal(path: &Path) -> String {
     let before = check_image_target(path).expect_err("rejection before rendering").to_string();
-    let after = atomic(path, b"new").expect_err("refused at the end").to_string();
+    let after = write_atomically(path, b"new").expect_err("refused at the end").to_string();
     assert_eq!(before, after);
     after
 }
@@ -56,9 +56,9 @@ fn refusal(path: &Path) -> String {
 fn file_is_created_and_then_replaced() {
     let directory = scratch();
     let path = directory.path().join("out.png");
-    atomic(&path, b"first").expect("written");
+    write_atomically(&path, b"first").expect("written");
     assert_eq!(fs::read(&path).expect("a file"), b"first");
-    atomic(&path, b"").expect("written");
+    write_atomically(&path, b"").expect("written");
     assert_eq!(fs::read(&path).expect("a file"), b"");
     assert_eq!(names(directory.path()), ["out.png"]);
 }
@@ -70,7 +70,7 @@ fn permissions_are_kept() {
     fs::write(&path, "old").expect("a file");
     for mode in [0o600, 0o664, 0o777] {
         fs::set_permissions(&path, fs::Permissions::from_mode(mode)).expect("a mode");
-        atomic(&path, b"new").expect("written");
+        write_atomically(&path, b"new").expect("written");
         assert_eq!(fs::metadata(&path).expect("a file").mode() & 0o7777, mode);
     }
 }
@@ -86,7 +86,7 @@ fn link_is_kept_and_its_target_replaced() {
     let path = directory.path().join("out.png");
     for bytes in [b"one", b"two"] {
         check_image_target(&path).expect("a valid target");
-        atomic(&path, bytes).expect("written");
+        write_atomically(&path, bytes).expect("written");
         assert_eq!(fs::read(&target).expect("a file"), bytes);
     }
     assert!(fs::symlink_metadata(&path).expect("a link").is_symlink());
@@ -109,7 +109,7 @@ fn full_disk_is_an_error() {
     let path = directory.path().join("x.png");
     symlink("/dev/full", &path).expect("a link");
     check_image_target(&path).expect("only the write must fail");
-    let message = atomic(&path, b"picture").expect_err("nothing fits").to_string();
+    let message = write_atomically(&path, b"picture").expect_err("nothing fits").to_string();
     assert_mentions(&message, &[&path.display().to_string(), &system_error(Errno::ENOSPC)]);
     assert!(fs::symlink_metadata("/dev/full").is_ok(), "the device must still exist");
 }
@@ -119,8 +119,8 @@ fn devices_are_written_in_place() {
     let directory = scratch();
     let path = directory.path().join("x.png");
     symlink("/dev/null", &path).expect("a link");
-    atomic(&path, b"picture").expect("written");
-    atomic(Path::new("/dev/null"), b"report").expect("written");
+    write_atomically(&path, b"picture").expect("written");
+    write_atomically(Path::new("/dev/null"), b"report").expect("written");
     assert!(!fs::metadata("/dev/null").expect("a device").is_file());
 }
 
@@ -129,7 +129,7 @@ fn pipe_needs_a_reader() {
     let directory = scratch();
     let path = directory.path().join("pipe.png");
     nix::unistd::mkfifo(&path, nix::sys::stat::Mode::S_IRWXU).expect("a pipe");
-    let error = atomic(&path, b"picture").expect_err("without a reader");
+    let error = write_atomically(&path, b"picture").expect_err("without a reader");
     let is_unconnected =
         matches!(&error, OutputError::File { source, .. } if source.kind() == ErrorKind::NotConnected);
     assert!(is_unconnected, "{error:?}");
@@ -138,7 +138,7 @@ fn pipe_needs_a_reader() {
     let reader = Command::new("cat").arg(&path).stdout(Stdio::piped()).spawn().expect("cat");
     let holder = fs::OpenOptions::new().write(true).open(&path).expect("a pipe with a reader");
     let collector = std::thread::spawn(move || reader.wait_with_output().expect("output of cat").stdout);
-    atomic(&path, &bytes).expect("written");
+    write_atomically(&path, &bytes).expect("written");
     drop(holder);
     assert!(collector.join().expect("no panic") == bytes);
 }
@@ -146,7 +146,7 @@ fn pipe_needs_a_reader() {
 #[test]
 fn stdout_is_written_in_place() {
     if let Some(path) = child_path() {
-        atomic(&path, b"report").expect("written");
+        write_atomically(&path, b"report").expect("written");
         return;
     }
     let run = |stdout: Stdio| {
@@ -188,7 +188,7 @@ fn impossible_targets_are_reported() {
 fn longest_possible_name_is_written() {
     let directory = scratch();
     let path = directory.path().join(format!("{}.png", "n".repeat(251)));
-    atomic(&path, b"picture").expect("written");
+    write_atomically(&path, b"picture").expect("written");
     assert_eq!(fs::read(&path).expect("a file"), b"picture");
 }
 
@@ -200,7 +200,7 @@ fn missing_permission_is_an_error() {
         assert_mentions(&message, &[&system_error(Errno::EACCES)]);
         let message = refusal(&directory.join("open/protected.png"));
         assert_mentions(&message, &["protected.png", &system_error(Errno::EACCES)]);
-        atomic(&directory.join("open/other.png"), b"new").expect("written");
+        write_atomically(&directory.join("open/other.png"), b"new").expect("written");
         return;
     }
     let directory = scratch();
@@ -245,7 +245,7 @@ fn assert_success(output: &Output) {
 #[test]
 fn file_size_limit_is_an_error() {
     if let Some(path) = child_path() {
-        let error = atomic(&path, &vec![1; 1 << 20]).expect_err("larger than the limit");
+        let error = write_atomically(&path, &vec![1; 1 << 20]).expect_err("larger than the limit");
         assert!(matches!(&error, OutputError::File { .. }));
         assert_mentions(&error.to_string(), &[&system_error(Errno::EFBIG), "ulimit -f"]);
         return;
@@ -270,7 +270,7 @@ fn concurrent_writers_leave_a_complete_file() {
     std::thread::scope(|scope| {
         for bytes in &contents {
             let path = &path;
-            scope.spawn(move || (0..25).for_each(|_| atomic(path, bytes).expect("written")));
+            scope.spawn(move || (0..25).for_each(|_| write_atomically(path, bytes).expect("written")));
         }
     });
     assert!(contents.contains(&fs::read(&path).expect("a file")));
@@ -288,12 +288,12 @@ fn kill_leaves_a_whole_file_and_cleans_up() {
     let pictures = two_images();
     if let Some(path) = child_path() {
         for bytes in pictures.iter().cycle() {
-            atomic(&path, bytes).expect("written");
+            write_atomically(&path, bytes).expect("written");
         }
     }
     let directory = scratch();
     let path = directory.path().join("out.png");
-    atomic(&path, &pictures[0]).expect("written");
+    write_atomically(&path, &pictures[0]).expect("written");
     let mut left_behind = 0;
     for round in 0..50_u64 {
         let mut writer = child(&this_binary(), test, &path).spawn().expect("a child");
@@ -315,6 +315,6 @@ fn kill_leaves_a_whole_file_and_cleans_up() {
         left_behind <= 1,
         "each write must remove temporary files of previous writes, but {left_behind} were left"
     );
-    atomic(&path, b"done").expect("written");
+    write_atomically(&path, b"done").expect("written");
     assert_eq!(names(directory.path()), ["out.png"]);
 }

@@ -136,5 +136,5 @@ pub(crate) fn assert_mentions(message: &str, facts: &[&str]) {
 
 /// The text for an operating system error, as it appears in messages.
 pub(crate) fn system_error(error: Errno) -> String {
-    glimt::system::describe_error(&std::io::Error::from_raw_os_error(error as i32))
+    glimt::system::describe_io_error(&std::io::Error::from_raw_os_error(error as i32))
 }

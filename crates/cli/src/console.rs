@@ -10,7 +10,7 @@ use crate::exit::Exit;
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::report::{ReportStyle, render_diagnostics};
 use crate::scene::sanitize::escape_invisible_chars;
-use crate::system::describe_error;
+use crate::system::describe_io_error;
 use crate::tui::ColorDepthChoice;
 
 /// Writes to stderr and stdout.
@@ -88,9 +88,8 @@ impl Console {
     /// Returns the program's exit code: `exit`, or failure if writing to stdout failed.
     pub(super) fn final_exit_code(&self, exit: Exit) -> Exit {
         match self.stdout_error.take() {
-            Some(error) if exit == Exit::DONE => {
-                self.print_error(Exit::FAILED, &format!("cannot write to stdout: {}", describe_error(&error)))
-            }
+            Some(error) if exit == Exit::DONE => self
+                .print_error(Exit::FAILED, &format!("cannot write to stdout: {}", describe_io_error(&error))),
             Some(_) | None => exit,
         }
     }

@@ -10,18 +10,18 @@ use crate::exit::Exit;
 use crate::lower::RenderRequest;
 use crate::output::held;
 use crate::pipeline::protocol::{
-    CheckpointUpdate, Command, Event, Failure, SavedSceneRenderStatus, Stage, Status,
+    CheckpointUpdate, Command, Event, Failure, SavedSceneRenderStatus, Stage, StageStatus,
 };
 use crate::pipeline::watch::{
-    ExternalChange, FileHashCache, FilePathAndContentId, Watcher, find_missing_parent_or_working_folder,
+    ExternalChange, FileHashCache, FilePathAndContentId, Watcher, find_missing_folder,
 };
-use crate::pipeline::{not_a_scene_file_error, start};
+use crate::pipeline::{not_a_scene_file_error, start_worker};
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::sanitize::escape_invisible_chars;
-use crate::scene::{SAME_TEXT, is_file_not_found_diagnostic, read_scene_file_text};
+use crate::scene::{SAME_TEXT, is_scene_not_found_diagnostic, read_scene_file_text};
 use crate::system::threads::describe_thread_start_failure;
 use crate::tui::messages::{OLDER_THAN_EDIT, WAITING_FOR_FILE};
-use crate::tui::{self, EventQueue, EventSender, ExitStatus, Options, TuiError, TuiOutcome};
+use crate::tui::{self, EventQueue, EventSender, ExitStatus, TuiError, TuiOptions, TuiOutcome};
 
 /// How long to wait at exit for an image to be written. After that, glimt exits if it received a signal; if
 /// the user quit with a key, it prints a message and keeps waiting.
@@ -52,10 +52,10 @@ fn run_terminal_ui(request: RenderRequest, console: &Console) -> Result<Exit, (E
         .map_err(no_thread)?;
     let writes = SharedWriteLog::default();
     let listener = WorkerEventForwarder { watcher, writes: writes.clone(), ui: events.worker_sender() };
-    let worker = start(request.nice, Arc::clone(&contents), move |event| listener.handle_event(event))
+    let worker = start_worker(request.nice, Arc::clone(&contents), move |event| listener.handle_event(event))
         .map_err(no_thread)?;
     let (remote, asked) = (worker.command_sender(), writes.clone());
-    let options = Options {
+    let options = TuiOptions {
         scene: request.scene,
         overrides: request.overrides,
         color: request.color,
@@ -161,7 +161,7 @@ fn scene_not_found_error(scene: &Path) -> Option<Diagnostic> {
     }
     let problem =
         not_a_scene_file_error(scene).or_else(|| read_scene_file_text(scene).err().map(|problem| *problem));
-    problem.filter(is_file_not_found_diagnostic)
+    problem.filter(is_scene_not_found_diagnostic)
 }
 
 /// A log of written images, shared between threads.
@@ -232,11 +232,11 @@ impl SharedWriteLog {
                 log.lines.extend(lines);
             }
             Event::Stage { stage, .. } => {
-                log.is_last_stage = stage.name == Stage::Write && stage.status == Status::Running;
+                log.is_last_stage = stage.name == Stage::Write && stage.status == StageStatus::Running;
             }
             Event::Done { generation, report, .. } => {
                 log.is_last_stage = false;
-                let is_written = report.stages[Stage::Write as usize].status != Status::Skipped;
+                let is_written = report.stages[Stage::Write as usize].status != StageStatus::Skipped;
                 if is_written && *generation == log.read.0 {
                     log.image_files = Some(log.read.1.clone());
                 }
@@ -330,12 +330,12 @@ impl WorkerEventForwarder {
 
 /// Changes the help text for a missing scene to say that the UI waits for the scene to appear.
 fn add_waiting_for_scene_help(problem: &mut Diagnostic) {
-    if is_file_not_found_diagnostic(problem) {
+    if is_scene_not_found_diagnostic(problem) {
         // Keep a suggestion for a typo or a renamed scene.
         let is_file = |help: &String| help.starts_with("did you mean") || help.contains(SAME_TEXT);
         let file = problem.help.take().filter(is_file);
         let file = file.map_or(String::new(), |help| format!("; {help}"));
-        problem.help = Some(match find_missing_parent_or_working_folder(&problem.path) {
+        problem.help = Some(match find_missing_folder(&problem.path) {
             Some(folder) => format!(
                 "waiting for the folder {} and the scene to appear{file}",
                 escape_invisible_chars(&folder.to_string_lossy())

@@ -10,12 +10,12 @@ use crate::exit::Exit;
 use crate::lower::RenderRequest;
 use crate::output::AnimationFormat;
 use crate::pipeline::protocol::{
-    CheckpointUpdate, Command, Event, Failure, Report, Request, Stage, StageReport, Status, WriteRequirement,
-    WriteWarning,
+    CheckpointUpdate, Command, Event, Failure, Report, Request, Stage, StageReport, StageStatus,
+    WriteRequirement, WriteWarning,
 };
 use crate::pipeline::settings::{EffectiveSettingsSummary, Overrides};
 use crate::pipeline::turntable::{TurntableFrame, leftover_frames};
-use crate::pipeline::{Handle, start_with_new_channel};
+use crate::pipeline::{WorkerHandle, start_worker_with_channel};
 use crate::progress::{self, Reporter};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::signals;
@@ -33,7 +33,7 @@ const TICK: Duration = Duration::from_millis(50);
 pub(super) fn run(render_request: &RenderRequest, console: &Console) -> Exit {
     // Lower the priority before starting threads, because threads inherit it.
     priority::lower_priority_including_spawned_threads(render_request.nice);
-    let (worker, events) = match start_with_new_channel(0) {
+    let (worker, events) = match start_worker_with_channel(0) {
         Ok(started) => started,
         Err(error) => {
             return console.print_error(Exit::FAILED, &describe_thread_start_failure(1, false, &error));
@@ -168,7 +168,7 @@ impl ExitDeadline {
 
 /// Handles events until the request is finished or aborted by a signal.
 fn handle_events(
-    worker: &Handle,
+    worker: &WorkerHandle,
     events: &Receiver<Event>,
     overrides: &Overrides,
     console: &Console,
@@ -213,7 +213,7 @@ fn handle_events(
             warnings.retain(|_| is_first);
         }
         if let Event::Stage { stage, .. } = &event {
-            is_writing = stage.name == Stage::Write && stage.status == Status::Running;
+            is_writing = stage.name == Stage::Write && stage.status == StageStatus::Running;
         }
         reporter.handle_event(&event);
         match event {
@@ -274,7 +274,7 @@ fn handle_events(
 
 /// Whether a stage read a file that has changed since the previous frame.
 fn has_stage_reread_changed_file(stage: &StageReport) -> bool {
-    matches!(stage.name, Stage::Parse | Stage::Meshes | Stage::Textures) && stage.status == Status::Done
+    matches!(stage.name, Stage::Parse | Stage::Meshes | Stage::Textures) && stage.status == StageStatus::Done
 }
 
 /// Reports checkpoint news and warnings immediately, while the user can still react.

@@ -9,7 +9,7 @@ use signal_hook::iterator::Signals;
 use crate::console::Console;
 use crate::control::CancelToken;
 use crate::exit::Exit;
-use crate::system::describe_error;
+use crate::system::describe_io_error;
 use crate::system::threads::{describe_thread_start_failure, spawn};
 
 /// The first signal received, or 0.
@@ -58,7 +58,7 @@ pub(super) fn install_signal_handlers(
     on_signal: impl Fn() + Send + 'static,
 ) -> Result<ReceivedSignal, String> {
     let mut signals = Signals::new([SIGINT, SIGTERM, SIGHUP]).map_err(|error| {
-        let why = describe_error(&error);
+        let why = describe_io_error(&error);
         format!("cannot listen for signals: {why}; raise the limit on open files (`ulimit -n`)")
     })?;
     let received = ReceivedSignal::default();

@@ -12,7 +12,7 @@ use super::stages::meshes::MeshesByFileIndex;
 use super::stages::parse::ParsedScene;
 use super::watch::content::FilePathAndContentId;
 use crate::assets::gltf::has_gltf_extension;
-use crate::output::{FallbackFileIdentity, FileIdentity};
+use crate::output::{ApproximateFileIdentity, FileIdentity};
 use crate::scene::LoadedScene;
 use crate::scene::description::Camera;
 
@@ -125,7 +125,7 @@ impl ProtectedInputs {
             }
             on_disk
                 .alike
-                .extend(FallbackFileIdentity::from_path(&input.path).map(|likeness| (likeness, input)));
+                .extend(ApproximateFileIdentity::from_path(&input.path).map(|likeness| (likeness, input)));
         }
         on_disk
     }
@@ -140,7 +140,7 @@ impl ProtectedInputs {
 /// Inputs indexed by file identity, with fingerprints for finding similar files.
 pub(super) struct InputsByIdentity<'a> {
     by_identity: HashMap<FileIdentity, &'a ProtectedInput>,
-    alike: Vec<(FallbackFileIdentity, &'a ProtectedInput)>,
+    alike: Vec<(ApproximateFileIdentity, &'a ProtectedInput)>,
 }
 
 impl<'a> InputsByIdentity<'a> {
@@ -149,7 +149,7 @@ impl<'a> InputsByIdentity<'a> {
         if let Some(input) = self.by_identity.get(&FileIdentity::from_existing_or_new_path(path)?) {
             return Some(input);
         }
-        let own = FallbackFileIdentity::from_path(path)?;
+        let own = ApproximateFileIdentity::from_path(path)?;
         self.alike.iter().find(|(likeness, _)| own.may_equal(likeness)).map(|(_, input)| *input)
     }
 }

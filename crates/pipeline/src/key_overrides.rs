@@ -32,7 +32,7 @@ impl KeyboardOverrides {
     }
 
     /// Adds the changes to overrides from the command line.
-    pub fn add_to_command_line_overrides(&self, command_line: &Overrides) -> Overrides {
+    pub fn merged_with_command_line(&self, command_line: &Overrides) -> Overrides {
         Overrides {
             shadows: self.shadows.or(command_line.shadows),
             integrator: self.integrator.or(command_line.integrator),

@@ -84,7 +84,7 @@ pub(crate) fn key_with_tree_kind(of: &Fingerprint, accel: Accel) -> Fingerprint 
 fn all_object_shapes_key(scene: &Scene, of: &FingerprintContext<'_>) -> Fingerprint {
     let mut key = FingerprintHasher::new("shapes");
     for object in &scene.objects {
-        key.add(&object.shape, of);
+        key.add_with_references(&object.shape, of);
     }
     key.finish()
 }
@@ -130,27 +130,28 @@ pub(crate) fn lights_key(
 
 fn light_descriptions_key(scene: &Scene, of: &FingerprintContext<'_>) -> Fingerprint {
     let mut key = FingerprintHasher::new("described lights");
-    key.add(&scene.environment, of);
+    key.add_with_references(&scene.environment, of);
     for light in &scene.lights {
-        key.add(light, of);
+        key.add_with_references(light, of);
     }
     for (number, object) in scene.objects.iter().enumerate() {
         match object.material.map(|index| &scene.materials[index]) {
             Some(material) if !material.emits() => {}
             Some(material) => {
                 key.add_usize(number)
-                    .add(&object.shape, of)
-                    .add(&material.emission, of)
-                    .add(&material.opacity, of);
-                key.add(&material.emitter_coat().cloned(), of).add(&object.placement.as_deref().copied(), of);
+                    .add_with_references(&object.shape, of)
+                    .add_with_references(&material.emission, of)
+                    .add_with_references(&material.opacity, of);
+                key.add_with_references(&material.emitter_coat().cloned(), of)
+                    .add_with_references(&object.placement.as_deref().copied(), of);
                 // Blends emit through their parts, so add the whole material.
                 if !material.kind.blend_parts().is_empty() {
-                    key.add(material, of);
+                    key.add_with_references(material, of);
                 }
             }
             // Materials from the mesh file may emit.
             None => {
-                key.add_usize(number).add(&object.shape, of).add_str("own");
+                key.add_usize(number).add_with_references(&object.shape, of).add_str("own");
             }
         }
     }
@@ -160,7 +161,7 @@ fn light_descriptions_key(scene: &Scene, of: &FingerprintContext<'_>) -> Fingerp
 /// Returns the key for a world. It excludes the tree type, because all types produce the same hits. Views
 /// that visualize trees include the type in their own keys.
 pub(crate) fn world_key(surfaces: &Fingerprint, camera: &Camera, of: &FingerprintContext<'_>) -> Fingerprint {
-    FingerprintHasher::new("world").add_fingerprint(surfaces).add(camera, of).finish()
+    FingerprintHasher::new("world").add_fingerprint(surfaces).add_with_references(camera, of).finish()
 }
 
 /// Returns the key for photons: surfaces relative to `origin`, emission and maximum depth.
@@ -206,11 +207,11 @@ pub(crate) fn surfaces_and_lights_key(
         .add_fingerprint(&light_descriptions_key(scene, of));
     for object in objects {
         match object.material {
-            Some(index) => key.add_usize(1).add(&materials[index], of),
+            Some(index) => key.add_usize(1).add_with_references(&materials[index], of),
             None => key.add_usize(0),
         };
         key.add_bool(object.shape.as_mesh().is_some_and(|mesh| mesh.vertex_colors));
-        key.add(&object.placement.as_deref().copied(), of);
+        key.add_with_references(&object.placement.as_deref().copied(), of);
     }
     for texture in textures {
         key.add_fingerprint(texture);
@@ -225,7 +226,7 @@ pub(crate) fn film_sums_key(
     crop: Option<Rect>,
 ) -> Fingerprint {
     let mut key = FingerprintHasher::new("render");
-    key.add_fingerprint(&world).add(settings, &FingerprintContext::default());
+    key.add_fingerprint(&world).add_with_references(settings, &FingerprintContext::default());
     if let Some(rect) = crop {
         key.add_u64(rect.x.into())
             .add_u64(rect.y.into())

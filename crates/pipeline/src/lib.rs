@@ -1,6 +1,6 @@
 //! The render pipeline: from scene files to previews and images.
 //!
-//! [`start`] starts a worker thread and returns a [`Handle`], which accepts commands. The worker owns a session
+//! [`start_worker`] starts a worker thread and returns a [`WorkerHandle`], which accepts commands. The worker owns a session
 //! (`session`), which runs the steps of each request: it prepares the scene (`prepare`), renders its film
 //! (`render`) and writes the image. [`headless`] renders without a worker. [`watch`] reports files whose content
 //! has changed.
@@ -63,4 +63,4 @@ pub use formats::{
 };
 pub use stages::parse::files_referenced_by_assets;
 pub use watch::content::{FileContentId, FilePathAndContentId};
-pub use worker::{CommandSender, Handle, start, start_with_new_channel};
+pub use worker::{CommandSender, WorkerHandle, start_worker, start_worker_with_channel};

@@ -121,13 +121,13 @@ impl RenderPlan {
 }
 
 /// Resolved settings of the image to show, and of the image that the scene specifies.
-pub(super) struct RequestPlans {
+pub(super) struct ShownAndScenePlans {
     pub(super) shown: RenderPlan,
     /// Settings of the scene's own image, or `None` if the request is for that image.
     pub(super) own: Option<RenderPlan>,
 }
 
-impl RequestPlans {
+impl ShownAndScenePlans {
     /// Merges a scene and the overrides of a request.
     ///
     /// # Errors

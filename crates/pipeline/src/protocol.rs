@@ -12,7 +12,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
-pub use self::stage::{Stage, StageReport, Status};
+pub use self::stage::{Stage, StageReport, StageStatus};
 pub use super::answers::{
     CameraSaveResult, NormalizedPosition, NormalizedRect, PickedInstance, PickedObject, PickedPixel,
     SavedCameraEdit, UserMovedCamera,
@@ -36,7 +36,7 @@ pub enum Command {
     /// Write the current image to its files as soon as every pixel has a sample.
     Write,
     /// Change the preview size and show the current image again. Rendering continues.
-    Preview(Option<MaxPreviewSize>),
+    Preview(Option<PreviewBounds>),
     /// Write this camera to the scene file. [`Event::CameraKept`] reports the result. Rendering continues.
     KeepCamera(Box<UserMovedCamera>),
     /// Undo this edit of the scene file unless the file has changed since then. [`Event::CameraUndone`]
@@ -65,7 +65,7 @@ pub struct Request {
     /// Overrides from the command line and the keyboard.
     pub overrides: Overrides,
     /// Maximum size of previews, which keep the image's aspect ratio. `None` disables previews.
-    pub preview: Option<MaxPreviewSize>,
+    pub preview: Option<PreviewBounds>,
     /// Whether to write the finished image.
     pub write: WriteRequirement,
     /// If this request shows another image than the scene's own, the overrides for the scene's own image, whose
@@ -88,7 +88,7 @@ impl Request {
     }
 
     /// Returns the overrides for the scene's own image.
-    pub(super) fn saved_scene_overrides(&self) -> &Overrides {
+    pub(super) fn scene_image_overrides(&self) -> &Overrides {
         self.own.as_deref().unwrap_or(&self.overrides)
     }
 
@@ -112,7 +112,7 @@ pub enum WriteRequirement {
 
 /// Maximum preview size on a display with square pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MaxPreviewSize {
+pub struct PreviewBounds {
     /// Maximum width in pixels.
     pub width: u32,
     /// Maximum height in pixels.

@@ -24,7 +24,7 @@ use crate::messages::{
 use crate::output::{AttributeLossPolicy, OutputError, write};
 use crate::scene::description::CameraOverrides;
 use crate::scene::{LoadedScene, read_scene_file_text};
-use crate::system::{describe_error, file};
+use crate::system::{describe_io_error, file};
 use crate::world::World;
 
 /// A query or edit requested by the user.
@@ -159,7 +159,7 @@ impl QueryContext {
                 false => save_model_scene_with_camera(loaded, camera),
             };
         }
-        let read = loaded.source.file_text();
+        let read = loaded.source.text_without_set_args();
         let changed = SCENE_FILE_CHANGED;
         if is_file_missing(&path) {
             return Err(SCENE_FILE_MISSING.to_owned());
@@ -221,7 +221,7 @@ fn replace_scene_text_if_unchanged(
 ) -> Result<(), String> {
     let metadata = file::file_kind_and_metadata(path)
         .map(|(_, metadata)| metadata)
-        .map_err(|error| describe_error(&error))?;
+        .map_err(|error| describe_io_error(&error))?;
     if let Some(why) = file::hard_linked_or_readonly_reason(&metadata) {
         return Err(format!("{} {why}: {outcome}", path.display()));
     }
@@ -233,7 +233,7 @@ fn replace_scene_text_if_unchanged(
         sweep: None,
         losses: AttributeLossPolicy::Refuse,
     };
-    write::atomic_if_unchanged(path, old.as_bytes(), new.as_bytes(), &guard, &CancelToken::new())
+    write::write_atomically_if_unchanged(path, old.as_bytes(), new.as_bytes(), &guard, &CancelToken::new())
         .map_err(|error| error.to_string())
 }
 
@@ -250,7 +250,7 @@ fn save_model_scene_with_camera(
     }
     let text = loaded.text_with_camera(camera)?;
     write::create_new(&path, text.as_bytes())
-        .map_err(|error| format!("cannot write {shown}: {}", describe_error(&error)))?;
+        .map_err(|error| format!("cannot write {shown}: {}", describe_io_error(&error)))?;
     Ok(CameraSaveResult { path, is_new: true, is_own: false, of_model: true, edit: None })
 }
 

@@ -47,7 +47,7 @@ impl EventSink {
         self.send(Event::WriteFailed { generation: self.generation, path, message });
     }
 
-    pub(super) fn send_write_conflicts(&self, conflicts: Vec<Diagnostic>) {
+    pub(super) fn send_write_refused(&self, conflicts: Vec<Diagnostic>) {
         self.send(Event::Refused { generation: self.generation, conflicts });
     }
 

@@ -1,6 +1,6 @@
 //! Times each stage and reports its start and end.
 
-use super::protocol::{Event, Stage, StageReport, Status};
+use super::protocol::{Event, Stage, StageReport, StageStatus};
 use super::sink::EventSink;
 use super::stages::StageResult;
 use super::stopwatch::PausableStopwatch;
@@ -25,7 +25,7 @@ impl<'a> StageRecorder<'a> {
     pub(super) fn start(&mut self, name: Stage) -> RunningStage<'_, 'a> {
         let (watch, cpu_seconds) = (PausableStopwatch::start(self.token), process_cpu_seconds());
         let stage = RunningStage { table: self, name, watch, cpu_seconds };
-        stage.table.send_stage_report(stage.report(Status::Running, String::new()));
+        stage.table.send_stage_report(stage.report(StageStatus::Running, String::new()));
         stage
     }
 
@@ -55,7 +55,7 @@ impl RunningStage<'_, '_> {
         result.value
     }
 
-    fn report(&self, status: Status, why: String) -> StageReport {
+    fn report(&self, status: StageStatus, why: String) -> StageReport {
         let processor_seconds = process_cpu_seconds() - self.cpu_seconds;
         StageReport { name: self.name, status, seconds: self.watch.seconds(), processor_seconds, why }
     }

@@ -68,7 +68,7 @@ pub(super) fn output_conflicts(plan: &RenderPlan, inputs: &ProtectedInputs) -> V
     let twin =
         |target: OutputTarget<'_>, at: &FileIdentity| first.get(at).copied().filter(|first| *first != target);
     let each = targets_of_all_frames(plan)
-        .filter_map(|target| target_conflict(plan, target, target.path, &inputs, twin));
+        .filter_map(|target| write_conflict(plan, target, target.path, &inputs, twin));
     each.chain(linked_frame_conflicts(plan)).collect()
 }
 
@@ -115,7 +115,7 @@ pub(super) fn write_guarded<'a, T>(
             let mut others = current_targets(plan).filter(|other| *other != target);
             others.find(|other| FileIdentity::from_existing_or_new_path(other.path).as_ref() == Some(at))
         };
-        match target_conflict(plan, target, real, &inputs, twin) {
+        match write_conflict(plan, target, real, &inputs, twin) {
             Some(conflict) => Err(OutputError::Refused { reason: format_conflict_line(&conflict) }),
             None => Ok(()),
         }
@@ -153,7 +153,7 @@ fn current_targets(plan: &RenderPlan) -> impl Iterator<Item = OutputTarget<'_>> 
 
 /// Returns the reason for not writing a target that resolves to `at`. `twin` finds another target that is the
 /// same file.
-fn target_conflict<'a>(
+fn write_conflict<'a>(
     plan: &'a RenderPlan,
     target: OutputTarget<'a>,
     at: &Path,

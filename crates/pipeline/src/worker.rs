@@ -27,46 +27,46 @@ use mailbox::Task;
 ///
 /// # Errors
 /// The system cannot start a thread.
-pub fn start(
+pub fn start_worker(
     nice: u8,
     contents: Arc<FileHashCache>,
     listener: impl Fn(Event) + Send + Sync + 'static,
-) -> std::io::Result<Handle> {
-    start_with_config(SessionConfig { nice, ..SessionConfig::default() }, contents, Arc::new(listener))
+) -> std::io::Result<WorkerHandle> {
+    start_worker_with_config(SessionConfig { nice, ..SessionConfig::default() }, contents, Arc::new(listener))
 }
 
 /// Starts a worker thread, and returns a channel that receives its events.
 ///
 /// # Errors
 /// The system cannot start a thread.
-pub fn start_with_new_channel(nice: u8) -> std::io::Result<(Handle, Receiver<Event>)> {
+pub fn start_worker_with_channel(nice: u8) -> std::io::Result<(WorkerHandle, Receiver<Event>)> {
     let (sender, events) = mpsc::channel();
     // Ignore a disconnected front end.
-    Ok((start(nice, Arc::default(), move |event| drop(sender.send(event)))?, events))
+    Ok((start_worker(nice, Arc::default(), move |event| drop(sender.send(event)))?, events))
 }
 
 /// Starts a worker with this configuration.
-pub(super) fn start_with_config(
+pub(super) fn start_worker_with_config(
     config: SessionConfig,
     contents: Arc<FileHashCache>,
     listener: EventListener,
-) -> std::io::Result<Handle> {
+) -> std::io::Result<WorkerHandle> {
     let remote = CommandSender::new(listener);
     let previews = PreviewSlot::default();
     let worker = Worker { remote: remote.clone(), previews: previews.clone(), config, contents };
     let thread = spawn("glimt-worker", move || worker.run_loop())?;
-    Ok(Handle { previews, remote, thread: Some(thread) })
+    Ok(WorkerHandle { previews, remote, thread: Some(thread) })
 }
 
 /// A handle to a running worker. Dropping it stops the worker and blocks while a file is being written.
-pub struct Handle {
+pub struct WorkerHandle {
     /// Slot for the latest preview.
     pub previews: PreviewSlot,
     remote: CommandSender,
     thread: Option<JoinHandle<()>>,
 }
 
-impl Handle {
+impl WorkerHandle {
     /// Sends a command without blocking.
     pub fn send(&self, command: Command) {
         self.remote.send(command);
@@ -102,7 +102,7 @@ impl Handle {
     }
 }
 
-impl Drop for Handle {
+impl Drop for WorkerHandle {
     fn drop(&mut self) {
         self.send(Command::Quit);
         if let Some(thread) = self.thread.take() {
@@ -128,7 +128,7 @@ impl Worker {
         loop {
             let outcome = match self.remote.wait_for_next_task() {
                 Task::Quit => {
-                    session.checkpoint_own_image(&sink, self.remote.interruption());
+                    session.save_scene_image_checkpoint(&sink, self.remote.interruption());
                     break;
                 }
                 Task::Write

@@ -78,7 +78,11 @@ impl FingerprintHasher {
     }
 
     /// Adds a value and everything it refers to.
-    pub fn add(&mut self, part: &impl Fingerprinted, of: &FingerprintContext<'_>) -> &mut Self {
+    pub fn add_with_references(
+        &mut self,
+        part: &impl Fingerprinted,
+        of: &FingerprintContext<'_>,
+    ) -> &mut Self {
         part.add_to_fingerprint(self, of);
         self
     }

@@ -33,7 +33,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-pub use self::toml::{BuiltValue, GeneratedFile, SceneDocumentBuilder, quote_toml_string};
+pub use self::toml::{BuiltValue, InMemoryFile, SceneDocumentBuilder, quote_toml_string};
 pub use changes::{MAX_COMPARED_BYTES, list_changes};
 use description::{Camera, ResolvedCamera, Scene};
 use diagnostic::{Diagnostic, Severity};
@@ -57,7 +57,7 @@ pub const MODEL_NOT_FOUND: &str = "file not found";
 pub const SAME_TEXT: &str = "has the same text";
 
 /// Whether a diagnostic reports that the scene or model file does not exist.
-pub fn is_file_not_found_diagnostic(diagnostic: &Diagnostic) -> bool {
+pub fn is_scene_not_found_diagnostic(diagnostic: &Diagnostic) -> bool {
     [SCENE_NOT_FOUND, MODEL_NOT_FOUND].contains(&diagnostic.message.as_str())
 }
 
@@ -111,7 +111,7 @@ impl LoadedScene {
     }
 
     /// The files that exist only in memory, with their paths.
-    pub fn generated_files(&self) -> impl Iterator<Item = (PathBuf, &GeneratedFile)> {
+    pub fn in_memory_files(&self) -> impl Iterator<Item = (PathBuf, &InMemoryFile)> {
         let folder = self.path.parent().unwrap_or(Path::new(""));
         let files = self.built.iter().flat_map(|built| built.generated.iter());
         files.map(move |(name, file)| (folder.join(name), file))
@@ -125,7 +125,7 @@ impl LoadedScene {
     pub fn text_with_camera(&self, camera: &ResolvedCamera) -> Result<String, String> {
         match &self.built {
             Some(built) => edit::replace_camera(&built.to_toml(), camera),
-            None => edit::replace_camera(self.source.file_text(), camera),
+            None => edit::replace_camera(self.source.text_without_set_args(), camera),
         }
     }
 
@@ -202,7 +202,7 @@ pub fn load(path: &Path, sets: &[String]) -> Result<LoadedScene, Vec<Diagnostic>
     let text = read::read_scene_text(path).map_err(|problem| vec![*problem])?;
     let source = SceneText::with_set_args(text, sets)?;
     let outcome = document::parse_and_lower(&source, path);
-    let named = || document::files_referenced_by_text(source.file_text(), path);
+    let named = || document::files_referenced_by_text(source.text_without_set_args(), path);
     let named = if sets.is_empty() { Vec::new() } else { named() };
     loaded_scene_from_parse_outcome(outcome, source, None, path, named)
 }

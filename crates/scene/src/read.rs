@@ -10,7 +10,7 @@ use super::other_content::{NEW_SCENE_HELP, NonSceneContent, detect_image_or_part
 use super::sanitize::escape_invisible_chars;
 use super::{MAX_FILE_BYTES, MAX_PARTS, SCENE_NOT_FOUND};
 use crate::system::file::{self, FileKind};
-use crate::system::{RAISE_FILE_LIMIT, describe_error, folder, is_too_many_open_files};
+use crate::system::{RAISE_FILE_LIMIT, describe_io_error, folder, is_too_many_open_files};
 
 /// Error message for binary files.
 const NOT_TEXT: &str = "this is a binary file, not a scene";
@@ -144,7 +144,7 @@ fn unreadable_refusal(path: &Path, error: &io::Error) -> RefusalMessageAndHelp {
         return (SCENE_NOT_FOUND.to_owned(), Some(help));
     }
     let help = is_too_many_open_files(error).then(|| RAISE_FILE_LIMIT.to_owned());
-    (format!("cannot read the scene file: {}", describe_error(error)), help)
+    (format!("cannot read the scene file: {}", describe_io_error(error)), help)
 }
 
 /// Returns the help text for a missing file: the missing folder, or a file with a similar name among those

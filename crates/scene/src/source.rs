@@ -72,13 +72,13 @@ impl SceneText {
     }
 
     /// The file's text.
-    pub fn file_text(&self) -> &str {
+    pub fn text_without_set_args(&self) -> &str {
         self.all.get(..self.file).unwrap_or_default()
     }
 
-    /// Returns [`Self::file_text`] as an `Arc`. Copies the text only if there are `--set` values.
-    pub fn file_text_as_arc(&self) -> Arc<str> {
-        if self.sets.is_empty() { Arc::clone(&self.all) } else { self.file_text().into() }
+    /// Returns [`Self::text_without_set_args`] as an `Arc`. Copies the text only if there are `--set` values.
+    pub fn text_without_set_args_as_arc(&self) -> Arc<str> {
+        if self.sets.is_empty() { Arc::clone(&self.all) } else { self.text_without_set_args().into() }
     }
 
     /// Returns the byte offsets of the `--set` values.
@@ -113,7 +113,7 @@ impl SceneText {
     pub(super) fn line_number(&self, span: &Range<usize>) -> usize {
         match self.files.iter().find_map(|file| Some((file, file.local_span(span)?))) {
             Some((file, local)) => line_number_at(&file.text, local.start),
-            None => line_number_at(self.file_text(), span.start),
+            None => line_number_at(self.text_without_set_args(), span.start),
         }
     }
 

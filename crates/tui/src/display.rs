@@ -158,7 +158,7 @@ impl Display {
         if !extras.links.is_empty() {
             terminal::mark_links_used();
         }
-        self.painter.set_target_with_extras(wanted, picture, fidelity, extras);
+        self.painter.set_target_with_links(wanted, picture, fidelity, extras);
         self.is_complete = false;
         self.is_preview_due |= is_new;
     }
@@ -197,7 +197,7 @@ impl Display {
         bytes.append(&mut self.asides);
         self.window_titles[1] = self.window_titles[0].clone();
         if !bytes.is_empty() {
-            self.send_slice(bytes, now);
+            self.send_slice_with_query(bytes, now);
         }
     }
 
@@ -216,7 +216,7 @@ impl Display {
         let room = room.saturating_sub(BEGIN_SYNCHRONIZED.len() + END_SYNCHRONIZED.len());
         let cells = self.painter.next_slice_before_deadline(room, is_late);
         if !cells.is_empty() {
-            self.send_slice(self.wrap_synchronized(cells), now);
+            self.send_slice_with_query(self.wrap_synchronized(cells), now);
             return true;
         }
         // Do not use synchronized output for images: kitty 0.26 loses chunks inside it. It is not needed,
@@ -224,7 +224,7 @@ impl Display {
         let rate = self.connection.estimated_bytes_per_second();
         let pixels = self.images.as_mut().and_then(|images| images.next_slice(room, rate));
         match pixels {
-            Some(pixels) => self.send_slice(pixels, now),
+            Some(pixels) => self.send_slice_with_query(pixels, now),
             None => self.mark_target_complete(),
         }
         !self.is_complete
@@ -250,7 +250,7 @@ impl Display {
         }
     }
 
-    fn send_slice(&mut self, mut slice: Vec<u8>, now: Instant) {
+    fn send_slice_with_query(&mut self, mut slice: Vec<u8>, now: Instant) {
         let question = self.connection.next_query();
         if question.is_some() {
             slice.extend_from_slice(STATUS);
@@ -281,7 +281,7 @@ impl Display {
     }
 
     /// Records that the operating system has accepted bytes.
-    pub(super) fn record_written_bytes(&mut self, bytes: usize) {
+    pub(super) fn record_accepted_bytes(&mut self, bytes: usize) {
         self.connection.record_written_bytes(bytes);
     }
 
@@ -364,7 +364,7 @@ mod tests {
             for second in 1..100 {
                 let (now, sent) = (now + Duration::from_millis(second), all.get());
                 display.send_next_slice(now, || false);
-                display.record_written_bytes(all.get() - sent);
+                display.record_accepted_bytes(all.get() - sent);
                 display.handle_reply(TerminalReply::Attributes, now);
                 display.handle_reply(TerminalReply::Ready, now);
             }

@@ -2,7 +2,7 @@
 
 use super::event::WriteFailure;
 use super::messages;
-use super::state::{KeyboardOverrides, RequestStatus, SceneImageProgress, State, WrittenFile};
+use super::state::{KeyboardOverrides, RequestStatus, SceneImageRenderProgress, State, WrittenImageFile};
 use super::view::text::format_count_with_noun;
 use crate::choice::Choice;
 use crate::pipeline::protocol::{Report, SampleCounts, SavedSceneRenderStatus};
@@ -14,7 +14,7 @@ use crate::scene::sanitize::escape_invisible_chars;
 pub(super) fn summary_text(state: &State) -> String {
     match &state.saving.write_failed {
         Some(failed) => describe_write_failure(state, failed),
-        None if state.saving.written.is_empty() => reason_for_no_image(state),
+        None if state.saving.written.is_empty() => reason_no_image_was_written(state),
         None => describe_files(&state.saving.written) + &describe_events_since_writing(state),
     }
 }
@@ -48,17 +48,19 @@ pub(super) fn output_file_names(state: &State) -> Option<String> {
 }
 
 /// Explains why this run has not written an image.
-fn reason_for_no_image(state: &State) -> String {
+fn reason_no_image_was_written(state: &State) -> String {
     if state.is_scene_broken() {
         return format!("no image written; {} has errors", scene_name(state));
     }
     let Some(name) = output_file_names(state) else { return "no image written".to_owned() };
     match state.saving.own {
-        SceneImageProgress { state: SavedSceneRenderStatus::Written, .. } => format!("{name} is up to date"),
-        SceneImageProgress { fraction, .. } if fraction > 0.0 => {
+        SceneImageRenderProgress { state: SavedSceneRenderStatus::Written, .. } => {
+            format!("{name} is up to date")
+        }
+        SceneImageRenderProgress { fraction, .. } if fraction > 0.0 => {
             format!("{name} not finished ({} %)", (fraction * 100.0).floor())
         }
-        SceneImageProgress { .. } => format!("{name} not finished"),
+        SceneImageRenderProgress { .. } => format!("{name} not finished"),
     }
 }
 
@@ -77,11 +79,11 @@ fn describe_events_since_writing(state: &State) -> String {
     if !state.request.has_no_keyboard_overrides() {
         let is_user_written = written.iter().any(|written| written.shows.is_some());
         return match state.saving.own {
-            SceneImageProgress { .. } if state.saving.are_images_older_than_scene() => {
+            SceneImageRenderProgress { .. } if state.saving.are_images_older_than_scene() => {
                 messages::OLDER_THAN_EDIT.to_owned()
             }
-            SceneImageProgress { .. } if is_user_written => String::new(),
-            SceneImageProgress { fraction, .. } => {
+            SceneImageRenderProgress { .. } if is_user_written => String::new(),
+            SceneImageRenderProgress { fraction, .. } => {
                 format!("; {NEXT_RENDER} is not finished ({:.0} %)", (fraction * 100.0).floor())
             }
         };
@@ -103,11 +105,11 @@ fn scene_name(state: &State) -> String {
 }
 
 /// Lists the written files and their descriptions, grouped by image.
-fn describe_files(written: &[WrittenFile]) -> String {
+fn describe_files(written: &[WrittenImageFile]) -> String {
     let alike = written.chunk_by(|one, next| one.made == next.made && one.shows == next.shows);
     let said: Vec<String> = alike
         .map(|files| {
-            let names: Vec<_> = files.iter().map(WrittenFile::escaped_path).collect();
+            let names: Vec<_> = files.iter().map(WrittenImageFile::escaped_path).collect();
             let made = files.first().map_or("", |it| &it.made);
             let colon = if made.is_empty() { "" } else { ": " };
             let shows = files.first().and_then(|it| it.shows).unwrap_or_default();
@@ -170,7 +172,7 @@ mod tests {
     use super::*;
     use crate::ContentChangeTime;
     use crate::fixtures::{TestUi, diagnostic, done_event, render_progress, written_event};
-    use crate::pipeline::protocol::{Event, Failure, Stage, Status};
+    use crate::pipeline::protocol::{Event, Failure, Stage, StageStatus};
     use crate::scene::description::Camera;
     use crate::scene::diagnostic::Severity;
 
@@ -289,7 +291,7 @@ mod tests {
                 generation,
                 message: "cannot write a.png: no space".to_owned(),
             });
-            ui.worker_event(finished(generation, Status::Skipped));
+            ui.worker_event(finished(generation, StageStatus::Skipped));
         };
         fail(&mut ui);
         let failed = "not written: cannot write a.png: no space";
@@ -298,12 +300,12 @@ mod tests {
             let generation = ui.state.request.generation;
             ui.worker_event(Event::Started { generation });
             assert!(summary_text(&ui.state).starts_with(failed), "{key}");
-            ui.worker_event(finished(generation, Status::Skipped));
+            ui.worker_event(finished(generation, StageStatus::Skipped));
             assert!(summary_text(&ui.state).starts_with(failed), "{key}");
         }
         // Return to the scene's own image after freeing disk space or writing the image.
         ui.press_character('0');
-        for status in [Status::Done, Status::Reused] {
+        for status in [StageStatus::Done, StageStatus::Reused] {
             fail(&mut ui);
             assert_eq!(summary_text(&ui.state), failed);
             ui.press_character('r');
@@ -315,7 +317,7 @@ mod tests {
     }
 
     /// A finished request whose write stage has this status.
-    fn finished(generation: u64, write: Status) -> Event {
+    fn finished(generation: u64, write: StageStatus) -> Event {
         let mut event = done_event(generation, Vec::new(), false);
         if let Event::Done { report, .. } = &mut event {
             report.stages[Stage::Write as usize].status = write;
@@ -460,7 +462,7 @@ mod tests {
         let said = crate::view::status_line::unsaved_image_messages(&ui.state);
         assert_eq!(
             said,
-            [messages::NOT_SAVED.to_owned(), messages::saved_scene_render_interrupted("cornell.png", 10)]
+            [messages::NOT_SAVED.to_owned(), messages::scene_image_render_interrupted("cornell.png", 10)]
         );
         assert!(ui.screen_text().contains(messages::NOT_SAVED), "{}", ui.screen_text());
         // `w` writes the displayed image.

@@ -20,7 +20,7 @@ use crate::film::Srgb8Image;
 use crate::math::DVec3;
 use crate::pipeline::protocol::{
     self, AssetProgress, Command, Failure, ImageReport, PreviewUpdate, RenderProgress, Report, Request,
-    ResolvedCamera, SampleCounts, Stage, StageReport, Status, WorkCounters,
+    ResolvedCamera, SampleCounts, Stage, StageReport, StageStatus, WorkCounters,
 };
 use crate::pipeline::settings::{AdjustableSceneSettings, EffectiveSettingsSummary, Overrides, ViewMode};
 use crate::scene::description::{Accel, ImageShiftAndMirror, Integrator, Pose, Projection, ShadowMode};
@@ -217,7 +217,7 @@ pub(super) fn camera() -> ResolvedCamera {
     }
 }
 
-pub(super) fn stage_report(name: Stage, status: Status, seconds: f64, why: &str) -> StageReport {
+pub(super) fn stage_report(name: Stage, status: StageStatus, seconds: f64, why: &str) -> StageReport {
     StageReport { name, status, seconds, processor_seconds: seconds, why: why.to_owned() }
 }
 
@@ -265,7 +265,7 @@ pub(super) fn done_event(generation: u64, warnings: Vec<Diagnostic>, unchanged: 
             tree_nodes: 0,
             memory_bytes: 0,
         },
-        stages: Stage::ALL.iter().map(|name| stage_report(*name, Status::Done, 0.25, "")).collect(),
+        stages: Stage::ALL.iter().map(|name| stage_report(*name, StageStatus::Done, 0.25, "")).collect(),
         counters: WorkCounters::default(),
         seconds: 1.93,
         peak_memory_bytes: 0,

@@ -123,7 +123,7 @@ impl RenderHistory {
                 let is_same = known.is_none() || past.shown.shows_same_image(&shown);
                 let origin = if is_same { past.origin.after_rerender_of_same_image(origin) } else { origin };
                 self.replace_entry_image(at, shown, time, origin);
-                self.merge_with_previous(at);
+                self.merge_if_same_as_previous(at);
             }
             None => {
                 let edits = self.read_edits;
@@ -162,7 +162,7 @@ impl RenderHistory {
     }
 
     /// Merges a finished entry with the previous one if both show the same image.
-    fn merge_with_previous(&mut self, at: usize) {
+    fn merge_if_same_as_previous(&mut self, at: usize) {
         let Some(before) = at.checked_sub(1) else { return };
         let is_open = self.open.as_ref().is_some_and(|(open, _)| *open == before);
         let Some((earlier, past)) = self.past.get(before).zip(self.past.get(at)) else { return };

@@ -59,7 +59,9 @@ pub use editor::editor_and_variable;
 pub use event_queue::{EventQueue, EventSender};
 pub use graphics::TestImageTerminal;
 pub use mosaic::squares_of_block_character;
-pub use options::{ContentChangeTime, ExitStatus, Options, PreviewChoice, TuiError, TuiOutcome, WatchEvent};
+pub use options::{
+    ContentChangeTime, ExitStatus, PreviewChoice, TuiError, TuiOptions, TuiOutcome, WatchEvent,
+};
 pub use probe::{ReportedTerminalFeatures, TerminalProbeResult, probe_terminal};
 pub use run::run;
 pub use static_image::{NamedImage, images_as_text};

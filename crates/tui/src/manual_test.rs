@@ -12,11 +12,11 @@ use super::fixtures::{
     asset_progress, diagnostic, done_event, effective_settings, scene_settings, stage_report,
 };
 use super::{
-    ColorDepthChoice, ContentChangeTime, EventQueue, EventSender, Options, PreviewChoice, WatchEvent, run,
+    ColorDepthChoice, ContentChangeTime, EventQueue, EventSender, PreviewChoice, TuiOptions, WatchEvent, run,
 };
 use crate::film::Srgb8Image;
 use crate::pipeline::protocol::{
-    Command, Event, Failure, PreviewSlot, PreviewUpdate, RenderProgress, Request, Stage, Status,
+    Command, Event, Failure, PreviewSlot, PreviewUpdate, RenderProgress, Request, Stage, StageStatus,
 };
 use crate::pipeline::settings::Overrides;
 use crate::scene::diagnostic::Severity;
@@ -33,7 +33,7 @@ fn interactive_session() {
     thread::spawn(move || run_simulated_worker(&orders, &sender, &slot));
     let watched = scene.clone();
     thread::spawn(move || poll_scene_file_changes(&watched, &watcher));
-    let options = Options {
+    let options = TuiOptions {
         scene,
         overrides: Overrides::default(),
         color: ColorDepthChoice::Auto,
@@ -100,9 +100,9 @@ fn simulate_render(
         say(Event::Failed { generation, failure });
         return None;
     }
-    say(Event::Stage { generation, stage: stage_report(Stage::Parse, Status::Done, 0.0003, "") });
+    say(Event::Stage { generation, stage: stage_report(Stage::Parse, StageStatus::Done, 0.0003, "") });
     say(Event::Settings { generation, settings: Box::new(effective_settings()), own: scene_settings() });
-    say(Event::Stage { generation, stage: stage_report(Stage::Textures, Status::Running, 0.0, "") });
+    say(Event::Stage { generation, stage: stage_report(Stage::Textures, StageStatus::Running, 0.0, "") });
     let start = Instant::now();
     for step in 0..=20_u32 {
         say(Event::Asset { generation, progress: asset_progress("bricks", u64::from(step.min(10)), 10) });

@@ -60,7 +60,7 @@ pub fn camera_saved(file: &str) -> String {
 }
 
 /// Shown when `c` has written the camera into the scene file but the command line overrides it.
-pub fn saved_camera_overridden(file: &str) -> String {
+pub fn camera_saved_but_overridden(file: &str) -> String {
     format!("camera saved to {file}, but --set overrides it in this run")
 }
 
@@ -272,12 +272,12 @@ pub const OLDER_THAN_EDIT: &str = " (older than your last edit)";
 pub const WAITING_FOR_FILE: &str = "waiting for it to appear";
 
 /// Shown when the render of the scene's own image is interrupted.
-pub fn saved_scene_render_interrupted(file: &str, percent: u32) -> String {
+pub fn scene_image_render_interrupted(file: &str, percent: u32) -> String {
     format!("{file} at {percent} %: press 0 to continue")
 }
 
 /// Shown when the scene has been edited since its own image was rendered.
-pub fn scene_image_outdated(file: &str) -> String {
+pub fn scene_image_file_outdated(file: &str) -> String {
     format!("{file} is older than your last edit: press 0 to render it")
 }
 

@@ -8,7 +8,7 @@ use crate::choice;
 use crate::pipeline::protocol::{Command, PreviewSlot};
 use crate::pipeline::settings::Overrides;
 pub use crate::pipeline::watch::{ContentChangeTime, ExternalChange, OutputChange, WatchEvent};
-use crate::system::describe_error;
+use crate::system::describe_io_error;
 
 choice! {
     /// How to draw the preview.
@@ -37,7 +37,7 @@ choice! {
 }
 
 /// Options for the front end.
-pub struct Options {
+pub struct TuiOptions {
     /// The scene file.
     pub scene: PathBuf,
     /// Overrides from the command line. Keys can make further changes.
@@ -112,7 +112,7 @@ pub enum TuiError {
         stream: &'static str,
     },
     /// The terminal could not be set up or written to.
-    #[error("cannot {action} the terminal: {}; `--once` renders without one", describe_error(source))]
+    #[error("cannot {action} the terminal: {}; `--once` renders without one", describe_io_error(source))]
     Terminal {
         /// The operation that failed.
         action: &'static str,

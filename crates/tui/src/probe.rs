@@ -124,19 +124,19 @@ fn query_in_raw_mode(questions: &[u8]) -> io::Result<Option<ReportedTerminalFeat
 
 fn query_and_read_replies(questions: &[u8]) -> io::Result<Option<ReportedTerminalFeatures>> {
     let (begin, mut replies) = (Instant::now(), ReceivedReplies::default());
-    send(STATUS)?;
+    write_to_terminal(STATUS)?;
     if !read_replies_until(&mut replies, begin, |replies| replies.has_received(TerminalReply::Ready))? {
         return Ok(None);
     }
     let round_trip = begin.elapsed();
-    send(&[questions, ATTRIBUTES].concat())?;
+    write_to_terminal(&[questions, ATTRIBUTES].concat())?;
     read_replies_until(&mut replies, Instant::now(), |replies| {
         replies.has_received(TerminalReply::Attributes)
     })?;
     Ok(Some(ReportedTerminalFeatures { round_trip, ..replies.to_reported_features() }))
 }
 
-fn send(bytes: &[u8]) -> io::Result<()> {
+fn write_to_terminal(bytes: &[u8]) -> io::Result<()> {
     let mut stdout = io::stdout().lock();
     stdout.write_all(bytes)?;
     stdout.flush()

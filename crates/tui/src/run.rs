@@ -14,7 +14,7 @@ use super::event::{Effect, Event};
 use super::event_queue::EventQueue;
 use super::exit_summary;
 use super::input;
-use super::options::{ExitStatus, Options, TuiError, TuiOutcome};
+use super::options::{ExitStatus, TuiError, TuiOptions, TuiOutcome};
 use super::presenter::FramePresenter;
 use super::preview_style::PreviewStyle;
 use super::signals::{self, SignalListener};
@@ -34,7 +34,7 @@ const MAX_PLANNING_TIME: Duration = Duration::from_millis(3);
 ///
 /// # Errors
 /// Returns a [`TuiError`] if there is no terminal, if writing to it fails, or if the worker has ended.
-pub fn run(options: Options, queue: EventQueue) -> Result<TuiOutcome, TuiError> {
+pub fn run(options: TuiOptions, queue: EventQueue) -> Result<TuiOutcome, TuiError> {
     terminal::require_terminal()?;
     let depth = color::resolve_color_depth(options.color, |name| std::env::var(name).ok());
     // Prevent crossterm from dropping named colors when NO_COLOR is set.
@@ -198,7 +198,7 @@ impl EventLoop {
                 self.presenter.display.handle_reply(answer, Instant::now());
                 return self.apply_event(event);
             }
-            Event::Written { bytes } => self.presenter.display.record_written_bytes(bytes),
+            Event::Written { bytes } => self.presenter.display.record_accepted_bytes(bytes),
             Event::Unwritable(kind) => return Some(loop_end_for_write_error(kind.into())),
             Event::Key(_) | Event::Mouse(_) => {
                 let end = self.apply_event(event);
@@ -267,7 +267,7 @@ impl EventLoop {
         let child_signals = signals::leave_signals_to_child();
         terminal::save_terminal_modes();
         let outcome = editor::run(&editor::editor_from_environment(|name| std::env::var(name).ok()), place);
-        terminal::restore_terminal_modes();
+        terminal::restore_saved_terminal_modes();
         input::set_input_paused(false);
         let end = self.apply_event(Event::EditorExited).or_else(|| self.resume_and_redraw());
         drop(child_signals);

@@ -74,7 +74,7 @@ impl SignalListener {
         spawn("signals", move || {
             loop {
                 signals.wait().for_each(|number| handler.handle_signal(number));
-                *lock_signal_round_count() += 1;
+                *lock_handled_round_count() += 1;
                 HANDLED_ROUNDS.1.notify_all();
             }
         })?;
@@ -99,7 +99,7 @@ static CHILD_HANDLES_SIGNALS: AtomicBool = AtomicBool::new(false);
 /// Number of rounds in which the signal thread has handled all pending signals.
 static HANDLED_ROUNDS: (Mutex<u64>, Condvar) = (Mutex::new(0), Condvar::new());
 
-fn lock_signal_round_count() -> MutexGuard<'static, u64> {
+fn lock_handled_round_count() -> MutexGuard<'static, u64> {
     HANDLED_ROUNDS.0.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -111,7 +111,7 @@ const SIGNAL_TIMEOUT: Duration = Duration::from_secs(10);
 /// may have started before the call.
 fn wait_for_pending_signals() {
     for _ in 0..2 {
-        let before = lock_signal_round_count();
+        let before = lock_handled_round_count();
         let last = *before;
         if low_level::raise(WAKE_SIGNAL).is_ok() {
             drop(HANDLED_ROUNDS.1.wait_timeout_while(before, SIGNAL_TIMEOUT, |now| *now == last));
@@ -240,7 +240,7 @@ impl SignalThread {
                 forward_termination_to_child(number);
             }
             let over = Arc::clone(&self.over);
-            thread::spawn(move || exit_after_grace_period(signal, status, &over));
+            thread::spawn(move || wait_grace_period_and_exit(signal, status, &over));
         }
         // If the channel is closed, the event loop has ended and does not need the signal.
         let _ = self.events.send(Event::Signal(signal));
@@ -274,7 +274,7 @@ fn exit_status_for(signal: Signal) -> Option<ExitStatus> {
 
 /// Ends the process if the event loop has not ended. Restores the terminal first, except after a hangup, when
 /// it no longer exists. The saved modes are always restored, because a running child may have changed them.
-fn exit_after_grace_period(signal: Signal, status: ExitStatus, over: &AtomicBool) {
+fn wait_grace_period_and_exit(signal: Signal, status: ExitStatus, over: &AtomicBool) {
     thread::sleep(GRACE_PERIOD);
     if signal != Signal::Hangup {
         if over.load(Ordering::Acquire) {
@@ -283,7 +283,7 @@ fn exit_after_grace_period(signal: Signal, status: ExitStatus, over: &AtomicBool
         terminal::restore_from_other_thread();
         thread::sleep(RESTORE_TIME_LIMIT);
     }
-    terminal::restore_terminal_modes();
+    terminal::restore_saved_terminal_modes();
     low_level::exit(i32::from(status.0));
 }
 

@@ -9,7 +9,7 @@ use super::event::WindowSize;
 use super::options::PreviewChoice;
 use super::paint::buffer_to_ansi_text;
 use super::terminal;
-use super::view::preview::{PreviewColors, draw_image, size_in_cells};
+use super::view::preview::{PreviewColorSettings, draw_image, size_in_cells};
 use super::view::text::{text_columns, truncated_text};
 use crate::film::Srgb8Image;
 
@@ -40,7 +40,7 @@ pub fn images_as_text(pictures: &[NamedImage], color: ColorDepthChoice, is_termi
     let variable = |name: &str| std::env::var(name).ok();
     let depth = color::resolve_color_depth(color, variable);
     let shades = ColorMapper::new(depth, color::assumed_ansi_colors(&variable("TERM").unwrap_or_default()));
-    let inks = PreviewColors {
+    let inks = PreviewColorSettings {
         depth,
         shades: &shades,
         is_light: color::colorfgbg_indicates_light_background(variable),
@@ -64,7 +64,7 @@ fn window_size_and_aspect(window: &WindowSize) -> ((u16, u16), f32) {
 /// Draws the images in one or more rows.
 fn draw_images_beside_or_stacked(
     pictures: &[NamedImage],
-    inks: PreviewColors<'_>,
+    inks: PreviewColorSettings<'_>,
     columns: u16,
     rows: u16,
     aspect: f32,
@@ -84,7 +84,7 @@ fn draw_images_beside_or_stacked(
 /// Draws images side by side below their captions, each scaled to fit into `columns` × `rows` cells.
 fn draw_images_side_by_side(
     pictures: &[NamedImage],
-    inks: PreviewColors<'_>,
+    inks: PreviewColorSettings<'_>,
     columns: u16,
     rows: u16,
     aspect: f32,
@@ -111,7 +111,7 @@ mod tests {
         let picture = Srgb8Image { width: 64, height: 48, pixels: vec![[200, 30, 30]; 64 * 48] };
         let named = |name: &str| NamedImage { name: name.to_owned(), picture: picture.clone() };
         let shades = ColorMapper::new(depth, &XTERM);
-        let inks = PreviewColors { depth, shades: &shades, is_light: false };
+        let inks = PreviewColorSettings { depth, shades: &shades, is_light: false };
         let buffers = draw_images_beside_or_stacked(
             &["a.png", "b.png", "a difference image with a long name"].map(named),
             inks,

@@ -107,14 +107,14 @@ impl Drop for TerminalSession {
 /// Terminal modes saved while another program uses the terminal, or `None` at other times.
 static LENT_TERMINAL_MODES: Mutex<Option<Termios>> = Mutex::new(None);
 
-/// Saves the terminal modes for [`restore_terminal_modes`] before another program uses the terminal.
+/// Saves the terminal modes for [`restore_saved_terminal_modes`] before another program uses the terminal.
 pub(super) fn save_terminal_modes() {
     *LENT_TERMINAL_MODES.lock().unwrap_or_else(PoisonError::into_inner) = tcgetattr(io::stdin()).ok();
 }
 
 /// Restores the modes saved by [`save_terminal_modes`], because a killed program may leave the terminal in a
 /// different mode. Errors are ignored because nothing can be done about them.
-pub(super) fn restore_terminal_modes() {
+pub(super) fn restore_saved_terminal_modes() {
     if let Some(modes) = LENT_TERMINAL_MODES.lock().unwrap_or_else(PoisonError::into_inner).take() {
         let _ = tcsetattr(io::stdin(), SetArg::TCSANOW, &modes);
     }

@@ -144,7 +144,7 @@ impl TerminalId {
         let get = |name: &str| variable(name).unwrap_or_default();
         let is_set = |name: &str| !get(name).is_empty();
         let term = get("TERM");
-        if is_set("TMUX") || is_set("STY") || is_text_only_terminal(&term) {
+        if is_set("TMUX") || is_set("STY") || supports_only_text_and_colors(&term) {
             return None;
         }
         let known =
@@ -232,7 +232,7 @@ impl TerminalId {
 }
 
 /// Whether a terminal with this `TERM` supports only text and colors, or intercepts other escape sequences.
-fn is_text_only_terminal(term: &str) -> bool {
+fn supports_only_text_and_colors(term: &str) -> bool {
     term.is_empty() || ["linux", "dumb", "vt", "screen", "tmux"].iter().any(|name| term.starts_with(name))
 }
 

@@ -25,7 +25,7 @@ pub(super) const PROGRESS_OFF: &[u8] = b"\x1b]9;4;0;0\x1b\\";
 
 /// State of the progress bar.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) enum ProgressBar {
+pub(super) enum TaskbarProgress {
     #[default]
     None,
     /// A render is running with unknown progress.
@@ -35,7 +35,7 @@ pub(super) enum ProgressBar {
     Broken,
 }
 
-impl ProgressBar {
+impl TaskbarProgress {
     fn to_escape_sequence(self) -> Vec<u8> {
         let bar = |state: u8, percent: u32| format!("\x1b]9;4;{state};{percent}\x1b\\").into_bytes();
         match self {
@@ -52,7 +52,7 @@ impl ProgressBar {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct TitleAndProgress {
     pub(super) title: Option<String>,
-    pub(super) bar: Option<ProgressBar>,
+    pub(super) bar: Option<TaskbarProgress>,
 }
 
 impl TitleAndProgress {
@@ -99,12 +99,12 @@ fn scene_file_name(state: &State) -> String {
     escape_invisible_chars(&name.to_string_lossy()).into_owned()
 }
 
-fn progress_bar_state(state: &State, percent: Option<u32>) -> ProgressBar {
+fn progress_bar_state(state: &State, percent: Option<u32>) -> TaskbarProgress {
     match state.work.activity {
-        RequestStatus::Running { .. } if state.work.paused => ProgressBar::Paused(percent.unwrap_or(0)),
-        RequestStatus::Running { .. } => percent.map_or(ProgressBar::Busy, ProgressBar::Percent),
-        RequestStatus::Broken => ProgressBar::Broken,
-        RequestStatus::Done | RequestStatus::Waiting | RequestStatus::Canceled => ProgressBar::None,
+        RequestStatus::Running { .. } if state.work.paused => TaskbarProgress::Paused(percent.unwrap_or(0)),
+        RequestStatus::Running { .. } => percent.map_or(TaskbarProgress::Busy, TaskbarProgress::Percent),
+        RequestStatus::Broken => TaskbarProgress::Broken,
+        RequestStatus::Done | RequestStatus::Waiting | RequestStatus::Canceled => TaskbarProgress::None,
     }
 }
 

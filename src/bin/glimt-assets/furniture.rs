@@ -14,7 +14,7 @@ pub(crate) fn furniture_meshes() -> Vec<(&'static str, PolygonMesh)> {
         ("furniture/foot.ply", furniture_foot()),
         ("furniture/leg.ply", table_leg()),
         ("furniture/board.ply", beveled_box([-0.5, 0.0, -0.5], [0.5, 0.03, 0.5], 0.006)),
-        ("furniture/plate.ply", glass_plate()),
+        ("furniture/plate.ply", round_glass_tabletop()),
         ("furniture/shelf.ply", shelf()),
         ("furniture/cover.ply", book_cover()),
         ("furniture/pages.ply", book_pages()),
@@ -84,7 +84,7 @@ fn table_leg() -> PolygonMesh {
 }
 
 /// A round glass plate of radius 0.5 with a rounded edge.
-fn glass_plate() -> PolygonMesh {
+fn round_glass_tabletop() -> PolygonMesh {
     let outline =
         [[0.0, 0.0], [0.494, 0.0], [0.498, 0.002], [0.5, 0.006], [0.498, 0.01], [0.494, 0.012], [0.0, 0.012]];
     solid_of_revolution(&outline, 64)

@@ -15,7 +15,7 @@ struct ObjWriter {
 
 impl ObjWriter {
     /// Adds a quad that faces u × v. `repeat` is the number of texture repetitions along each edge.
-    fn quad(&mut self, corner: Vector, u: Vector, v: Vector, repeat: [f64; 2]) {
+    fn write_quad(&mut self, corner: Vector, u: Vector, v: Vector, repeat: [f64; 2]) {
         let points = [corner, add(corner, u), add(add(corner, u), v), add(corner, v)];
         for [x, y, z] in points {
             let _ = writeln!(self.text, "v {x:.4} {y:.4} {z:.4}");
@@ -39,7 +39,7 @@ impl ObjWriter {
     }
 
     /// Adds a box on the floor, rotated about y.
-    fn block_on_floor(&mut self, center: [f64; 2], half: Vector, turns: f64) {
+    fn write_block_on_floor(&mut self, center: [f64; 2], half: Vector, turns: f64) {
         let (sin, cos) = sin_cos_turns(turns);
         let right = [cos, 0.0, -sin];
         let front = [sin, 0.0, cos];
@@ -47,11 +47,11 @@ impl ObjWriter {
         let middle = [center[0], 0.0, center[1]];
         let corner = |x: f64, z: f64| add(middle, add(scale(right, x * half[0]), scale(front, z * half[2])));
         let (wide, deep) = (scale(right, 2.0 * half[0]), scale(front, 2.0 * half[2]));
-        self.quad(corner(-1.0, 1.0), wide, up, [1.0, 1.0]);
-        self.quad(corner(1.0, 1.0), scale(deep, -1.0), up, [1.0, 1.0]);
-        self.quad(corner(1.0, -1.0), scale(wide, -1.0), up, [1.0, 1.0]);
-        self.quad(corner(-1.0, -1.0), deep, up, [1.0, 1.0]);
-        self.quad(add(corner(-1.0, 1.0), up), wide, scale(deep, -1.0), [1.0, 1.0]);
+        self.write_quad(corner(-1.0, 1.0), wide, up, [1.0, 1.0]);
+        self.write_quad(corner(1.0, 1.0), scale(deep, -1.0), up, [1.0, 1.0]);
+        self.write_quad(corner(1.0, -1.0), scale(wide, -1.0), up, [1.0, 1.0]);
+        self.write_quad(corner(-1.0, -1.0), deep, up, [1.0, 1.0]);
+        self.write_quad(add(corner(-1.0, 1.0), up), wide, scale(deep, -1.0), [1.0, 1.0]);
     }
 }
 
@@ -62,23 +62,23 @@ pub(crate) fn room_obj() -> Vec<u8> {
     let text = "# A room that is open to the front. Made by glimt-assets.\nmtllib room.mtl\n".to_owned();
     let mut room = ObjWriter { text, vertices: 0, quads: 0 };
     room.start_object("floor", "planks");
-    room.quad([-x, 0.0, z], [width, 0.0, 0.0], [0.0, 0.0, -depth], [2.0, 2.0]);
+    room.write_quad([-x, 0.0, z], [width, 0.0, 0.0], [0.0, 0.0, -depth], [2.0, 2.0]);
     room.start_object("ceiling", "plaster");
-    room.quad([-x, height, -z], [width, 0.0, 0.0], [0.0, 0.0, depth], [1.0, 1.0]);
+    room.write_quad([-x, height, -z], [width, 0.0, 0.0], [0.0, 0.0, depth], [1.0, 1.0]);
     room.start_object("back_wall", "plaster");
-    room.quad([-x, 0.0, -z], [width, 0.0, 0.0], [0.0, height, 0.0], [1.0, 1.0]);
+    room.write_quad([-x, 0.0, -z], [width, 0.0, 0.0], [0.0, height, 0.0], [1.0, 1.0]);
     room.start_object("left_wall", "teal");
-    room.quad([-x, 0.0, z], [0.0, 0.0, -depth], [0.0, height, 0.0], [1.0, 1.0]);
+    room.write_quad([-x, 0.0, z], [0.0, 0.0, -depth], [0.0, height, 0.0], [1.0, 1.0]);
     room.start_object("right_wall", "ochre");
-    room.quad([x, 0.0, -z], [0.0, 0.0, depth], [0.0, height, 0.0], [1.0, 1.0]);
+    room.write_quad([x, 0.0, -z], [0.0, 0.0, depth], [0.0, height, 0.0], [1.0, 1.0]);
     room.start_object("plinth", "plaster");
-    room.block_on_floor([-0.55, -0.45], [0.28, 0.62, 0.28], 0.06);
+    room.write_block_on_floor([-0.55, -0.45], [0.28, 0.62, 0.28], 0.06);
     room.start_object("chest", "lacquer");
-    room.block_on_floor([0.5, -0.1], [0.36, 0.24, 0.28], -0.07);
+    room.write_block_on_floor([0.5, -0.1], [0.36, 0.24, 0.28], -0.07);
     room.start_object("step", "tiles");
-    room.block_on_floor([0.5, -0.1], [0.5, 0.06, 0.42], -0.07);
+    room.write_block_on_floor([0.5, -0.1], [0.5, 0.06, 0.42], -0.07);
     room.start_object("lamp", "lamp");
-    room.quad([-0.35, height - 0.02, -0.3], [0.7, 0.0, 0.0], [0.0, 0.0, 0.6], [1.0, 1.0]);
+    room.write_quad([-0.35, height - 0.02, -0.3], [0.7, 0.0, 0.0], [0.0, 0.0, 0.6], [1.0, 1.0]);
     room.text.into_bytes()
 }
 

@@ -37,7 +37,7 @@ pub(crate) fn trefoil_knot_rope() -> PolygonMesh {
             add(center, add(scale(normal, 0.085 * cos), scale(binormal, 0.085 * sin)))
         };
         let tube = weld_grid_seams(
-            PolygonMesh::grid(512, 12, [1.0, 1.0], |s, t| tube_point(s, t, 0.082, middle)),
+            PolygonMesh::parametric_grid(512, 12, [1.0, 1.0], |s, t| tube_point(s, t, 0.082, middle)),
             512,
             12,
         );
@@ -50,12 +50,12 @@ pub(crate) fn trefoil_knot_rope() -> PolygonMesh {
 
 /// A tube along a trefoil knot. The texture repeats 24 times along the tube and twice around it.
 pub(crate) fn trefoil_knot_tube() -> PolygonMesh {
-    PolygonMesh::grid(224, 24, [24.0, 2.0], |s, t| tube_point(s, t, 0.24, trefoil_point))
+    PolygonMesh::parametric_grid(224, 24, [24.0, 2.0], |s, t| tube_point(s, t, 0.24, trefoil_point))
 }
 
 /// A hollow vase, a surface of revolution about y, 1.6 high.
 pub(crate) fn vase() -> PolygonMesh {
-    PolygonMesh::grid(64, 64, [4.0, 4.0], |s, t| {
+    PolygonMesh::parametric_grid(64, 64, [4.0, 4.0], |s, t| {
         let [radius, height] = vase_profile_point(t);
         let (sin, cos) = sin_cos_turns(s);
         [radius * cos, height, radius * sin]

@@ -19,7 +19,7 @@ const STEP: f64 = 1e-4;
 impl PolygonMesh {
     /// Creates `columns` × `rows` quads over s and t in [0, 1], with normals and the texture coordinates
     /// (1 − s, t) times `repeat`. The outside is along ∂t × ∂s.
-    pub(crate) fn grid(
+    pub(crate) fn parametric_grid(
         columns: u32,
         rows: u32,
         repeat: [f64; 2],

@@ -302,7 +302,9 @@ fn photons_do_not_depend_on_threads_or_tiles() {
                 &token,
             )
             .expect("the token is not canceled");
-            photons.trace_passes(&world, &settings, 0..4, &token).expect("the token is not canceled")
+            photons
+                .trace_passes_for_samples(&world, &settings, 0..4, &token)
+                .expect("the token is not canceled")
         })
     };
     let all = maps(1);
@@ -335,7 +337,7 @@ fn photons_do_not_depend_on_threads_or_tiles() {
             )
             .expect("the token is not canceled");
             let maps = photons
-                .trace_passes(&world, &settings, samples.clone(), &token)
+                .trace_passes_for_samples(&world, &settings, samples.clone(), &token)
                 .expect("the token is not canceled");
             let own: Vec<_> = at_once
                 .chunks(4)

@@ -401,7 +401,7 @@ pub fn maps(world: &World, settings: &RenderSettings, samples: u32) -> Option<Ph
             &token,
         );
         let (photons, _) = photons.expect("not canceled");
-        photons.trace_passes(world, settings, 0..samples, &token).expect("not canceled")
+        photons.trace_passes_for_samples(world, settings, 0..samples, &token).expect("not canceled")
     })
 }
 

@@ -9,7 +9,7 @@ use crate::system::memory::try_reserve_exact;
 impl Tile {
     /// Moves a pixel's running sum to its block sum if the block is complete.
     pub(super) fn close_pixel_block_if_complete(&mut self, pixel: usize, blocks: SumOrder) {
-        let Some(block) = blocks.block_ending_at(self.counts[pixel]) else { return };
+        let Some(block) = blocks.finished_block_sum_index(self.counts[pixel]) else { return };
         let put = |earlier: &mut [Vec<DVec3>], sums: &mut [DVec3]| {
             if let Some(block) = earlier.get_mut(block) {
                 block[pixel] += std::mem::take(&mut sums[pixel]);

@@ -228,7 +228,7 @@ impl SquaredMeanChanges {
     }
 
     /// Confidence in a measured variance reduction, from 0 to 1.
-    fn reduction_confidence(&self, level: usize, halves: &[usize]) -> f64 {
+    fn variance_reduction_confidence(&self, level: usize, halves: &[usize]) -> f64 {
         let spread = self.variance_uncertainty(level, halves);
         1.0 / (1.0 + UNCERTAINTY_PENALTY * spread * spread)
     }
@@ -321,7 +321,7 @@ impl ConvergenceModel {
     ) -> f64 {
         predict_doubling_variance_reduction(
             Self::clamped_measured_reduction(steps, level, halves),
-            steps.reduction_confidence(level, halves),
+            steps.variance_reduction_confidence(level, halves),
         )
     }
 
@@ -343,7 +343,8 @@ impl ConvergenceModel {
             steps.squared_step_pair_at_level(level, (cell, half), is_relative)?;
         let fall = Self::clamped_measured_reduction(steps, level, &[half]);
         let step = before.map_or(last, |before| (last + 2.0 * before / fall) / 3.0);
-        let rate = predict_doubling_variance_reduction(fall, steps.reduction_confidence(level, &[half]));
+        let rate =
+            predict_doubling_variance_reduction(fall, steps.variance_reduction_confidence(level, &[half]));
         let by_two = variance_from_squared_step(step, count, rate);
         let variance = match Self::estimate_variance_from_quadrupling(steps, level, (cell, half), is_relative)
         {
@@ -366,7 +367,7 @@ impl ConvergenceModel {
             steps.quadrupling_variance_reduction(level, at.1).unwrap_or(INDEPENDENT_QUADRUPLING_REDUCTION);
         let lasting = LASTING_QUADRUPLING
             * (fall - CHANCE_QUADRUPLING_REDUCTION).max(0.0)
-            * steps.reduction_confidence(level, &[at.1]);
+            * steps.variance_reduction_confidence(level, &[at.1]);
         let rate = (INDEPENDENT_QUADRUPLING_REDUCTION + lasting).min(MAX_QUADRUPLING_REDUCTION);
         Some((last + before) / (rate - 1.0))
     }

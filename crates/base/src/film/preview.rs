@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
-use super::resample::AxisResampler;
+use super::resample::AxisPixelMapping;
 use super::{Film, FilmQuantity, RadianceImage, is_in_thread_pool};
 use crate::math::{DVec3, Vec3};
 
@@ -94,8 +94,10 @@ impl Previewer {
             self.shares = vec![TileContribution::default(); film.tile_count()];
             (self.next, self.is_whole) = (0, false);
         }
-        let axes =
-            [AxisResampler::new(film.width(), self.width), AxisResampler::new(film.height(), self.height)];
+        let axes = [
+            AxisPixelMapping::new(film.width(), self.width),
+            AxisPixelMapping::new(film.height(), self.height),
+        ];
         let at_once =
             if is_in_thread_pool() { TILES_AT_ONCE * rayon::current_num_threads() } else { TILES_AT_ONCE };
         let mut looked = 0;
@@ -152,7 +154,7 @@ fn refresh_tile_contributions(
     shares: &mut [TileContribution],
     first: usize,
     (film, quantity): (&Film, FilmQuantity),
-    axes: [AxisResampler; 2],
+    axes: [AxisPixelMapping; 2],
 ) {
     let refresh = |(i, share): (usize, &mut TileContribution)| {
         if film.lock_tile(first + i).revision != share.revision {
@@ -171,13 +173,13 @@ impl TileContribution {
         &mut self,
         (film, quantity): (&Film, FilmQuantity),
         tile: usize,
-        [columns, rows]: [AxisResampler; 2],
+        [columns, rows]: [AxisPixelMapping; 2],
     ) {
         let Some(rect) = film.tile_rect(tile) else { return };
-        let first = |axis: AxisResampler, index| {
+        let first = |axis: AxisPixelMapping, index| {
             axis.overlapping_target_pixels(index).next().map_or(0, |(new, _)| new)
         };
-        let last = |axis: AxisResampler, index| {
+        let last = |axis: AxisPixelMapping, index| {
             axis.overlapping_target_pixels(index).last().map_or(0, |(new, _)| new)
         };
         (self.x, self.y) = (first(columns, rect.x), first(rows, rect.y));

@@ -33,7 +33,7 @@ pub struct DataRange {
     pub min: f32,
     /// Largest value in view.
     pub max: f32,
-    /// Bias b of the curve between `min` and `max`; see [`DataRange::position_in_range`].
+    /// Bias b of the curve between `min` and `max`; see [`DataRange::biased_range_position`].
     bias: f32,
 }
 
@@ -70,7 +70,7 @@ impl DataBrightnessMap {
             Self::None => numbers,
             Self::Unresolved(_) => Vec3::ZERO,
             Self::Resolved(DataKind::Distances, range) => each(&|x| range.distance_brightness(x)),
-            Self::Resolved(DataKind::Amounts, range) => each(&|x| range.position_in_range(x)),
+            Self::Resolved(DataKind::Amounts, range) => each(&|x| range.biased_range_position(x)),
         }
     }
 }
@@ -92,7 +92,7 @@ impl DataRange {
         }
         let middle = seen.len() / 2;
         let (_, &mut median, _) = seen.select_nth_unstable_by(middle, f32::total_cmp);
-        let place = linear.position_in_range(median);
+        let place = linear.biased_range_position(median);
         let bias = (1.0 - MIN_MEDIAN_BRIGHTNESS) / MIN_MEDIAN_BRIGHTNESS * place
             / (1.0 - place).max(f32::MIN_POSITIVE);
         Self { bias: bias.clamp(MIN_BIAS, 1.0), ..linear }
@@ -107,7 +107,7 @@ impl DataRange {
     /// above the first quarter of the range. Otherwise it is the curve x/(x + b(1 − x)), which maps the
     /// median to ¼ (Schlick, *Fast Alternatives to Perlin's Bias and Gain Functions*, Graphics Gems IV,
     /// 1994). Objects therefore keep distinct shades in front of a plane that extends to the horizon.
-    fn position_in_range(&self, number: f32) -> f32 {
+    fn biased_range_position(&self, number: f32) -> f32 {
         let range = self.max - self.min;
         let x = if range > 0.0 { ((number - self.min) / range).clamp(0.0, 1.0) } else { 0.0 };
         if self.bias < 1.0 { x / (x + self.bias * (1.0 - x)) } else { x }
@@ -118,7 +118,7 @@ impl DataRange {
         if distance < self.min {
             return if self.min.is_finite() { distance / self.min } else { distance.min(1.0) };
         }
-        1.0 - (1.0 - FARTHEST_BRIGHTNESS) * self.position_in_range(distance)
+        1.0 - (1.0 - FARTHEST_BRIGHTNESS) * self.biased_range_position(distance)
     }
 }
 

@@ -7,12 +7,12 @@ use crate::math::DVec3;
 
 /// Maps pixels along one axis to another resolution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct AxisResampler {
+pub(super) struct AxisPixelMapping {
     from: u64,
     to: u64,
 }
 
-impl AxisResampler {
+impl AxisPixelMapping {
     /// Maps `from` pixels to `to` pixels, both at least 1.
     pub(super) fn new(from: u32, to: u32) -> Self {
         Self { from: u64::from(from.max(1)), to: u64::from(to.max(1)) }
@@ -39,8 +39,8 @@ pub(super) fn resized(image: &RadianceImage, width: u32, height: u32) -> Radianc
     }
     let (width, height) = (width.max(1), height.max(1));
     // Use the inverse mapping to gather the old pixels that each new pixel covers. The overlaps are the same.
-    let columns = AxisResampler::new(image.width, width).inverse();
-    let rows = AxisResampler::new(image.height, height).inverse();
+    let columns = AxisPixelMapping::new(image.width, width).inverse();
+    let rows = AxisPixelMapping::new(image.height, height).inverse();
     let pixel = |i: usize| {
         let (mut sum, mut weights) = (DVec3::ZERO, 0.0);
         for (y, row_weight) in rows.overlapping_target_pixels((i / width as usize) as u32) {
@@ -83,7 +83,7 @@ mod tests {
     proptest! {
         #[test]
         fn overlaps_conserve_pixel_areas(from in 1_u32..70, to in 1_u32..70) {
-            let axis = AxisResampler::new(from, to);
+            let axis = AxisPixelMapping::new(from, to);
             let mut filled = vec![0.0; to as usize];
             for old in 0..from {
                 let parts: Vec<_> = axis.overlapping_target_pixels(old).collect();

@@ -14,7 +14,7 @@ impl Film {
     ) -> RadianceImage {
         let mut image = RadianceImage::black(rect.width, rect.height);
         if let Some(base) = base {
-            self.fill_from_base_image(base, rect, &mut image);
+            self.fill_image_from_base(base, rect, &mut image);
         }
         for index in 0..self.tile_count() {
             let Some(place) = self.tile_rect(index) else { continue };
@@ -34,7 +34,7 @@ impl Film {
         image
     }
 
-    fn fill_from_base_image(&self, base: &RadianceImage, rect: Rect, image: &mut RadianceImage) {
+    fn fill_image_from_base(&self, base: &RadianceImage, rect: Rect, image: &mut RadianceImage) {
         let at = |pixel: u32, from: u32, to: u32| u64::from(pixel) * u64::from(to) / u64::from(from);
         for y in rect.y..rect.y + rect.height {
             let row = at(y, self.height(), base.height) as usize * base.width as usize;

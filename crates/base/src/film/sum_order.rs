@@ -38,7 +38,7 @@ impl SumOrder {
 
     /// Index of the block sum that receives the block ending at `count` samples, or `None` if no block ends
     /// there.
-    pub(super) fn block_ending_at(self, count: u32) -> Option<usize> {
+    pub(super) fn finished_block_sum_index(self, count: u32) -> Option<usize> {
         let is_end = count > 0 && count.is_multiple_of(BLOCK_SIZE);
         match self {
             Self::Blocked if is_end => Some(0),

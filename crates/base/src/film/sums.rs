@@ -202,7 +202,7 @@ impl Tile {
             let part = rest.start..rest.end.min(rest.start + left);
             non_finite += match lobes {
                 None => add_finite_and_count_non_finite(&mut self.sums[index], &radiances[part.clone()]),
-                Some((weight, signs)) => self.add_with_negative_lobes(
+                Some((weight, signs)) => self.add_pixel_samples_by_lobe(
                     index,
                     weight,
                     &radiances[part.clone()],
@@ -227,7 +227,7 @@ impl Tile {
         non_finite
     }
 
-    fn add_with_negative_lobes(
+    fn add_pixel_samples_by_lobe(
         &mut self,
         index: usize,
         weight: f64,

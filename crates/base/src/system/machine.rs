@@ -40,11 +40,11 @@ fn machine_hash() -> u64 {
         let host = gethostname().unwrap_or_default();
         let boot = fs::read("/proc/sys/kernel/random/boot_id").unwrap_or_default();
         let namespace = fs::read_link("/proc/self/ns/pid").unwrap_or_default();
-        hash_machine(&host, &boot, &namespace)
+        hash_host_boot_and_namespace(&host, &boot, &namespace)
     })
 }
 
-fn hash_machine(host: &OsStr, boot: &[u8], namespace: &Path) -> u64 {
+fn hash_host_boot_and_namespace(host: &OsStr, boot: &[u8], namespace: &Path) -> u64 {
     let mut hasher = DefaultHasher::new();
     (host, boot, namespace).hash(&mut hasher);
     hasher.finish()
@@ -59,7 +59,7 @@ mod tests {
     #[test]
     fn machines_differ_in_host_boot_or_namespace() {
         let hash = |host: &str, boot: &str, namespace: &str| {
-            hash_machine(OsStr::new(host), boot.as_bytes(), Path::new(namespace))
+            hash_host_boot_and_namespace(OsStr::new(host), boot.as_bytes(), Path::new(namespace))
         };
         let machine = hash("render1", "a0b1", "pid:[1]");
         assert_eq!(hash("render1", "a0b1", "pid:[1]"), machine, "it does not depend on the process");

@@ -15,7 +15,7 @@ pub mod threads;
 use std::io::{Error, ErrorKind};
 
 /// Describes a file-system error for use within a sentence: in lower case and without the error number.
-pub fn describe_error(error: &Error) -> String {
+pub fn describe_io_error(error: &Error) -> String {
     #[cfg(unix)]
     if error.raw_os_error() == Some(nix::libc::ELOOP) {
         return "its symbolic links form a loop".to_owned();
@@ -48,13 +48,13 @@ mod tests {
 
     #[test]
     fn error_messages_have_no_numbers_or_capitals() {
-        let said = |number: i32| describe_error(&Error::from_raw_os_error(number));
+        let said = |number: i32| describe_io_error(&Error::from_raw_os_error(number));
         assert_eq!(said(nix::libc::ENOENT), "no such file or directory");
         assert_eq!(said(nix::libc::EACCES), "permission denied");
         assert_eq!(said(nix::libc::ELOOP), "its symbolic links form a loop");
         assert_eq!(said(nix::libc::ENOTDIR), "a part of its path is a file, not a folder");
         let zero = std::fs::metadata("a\0b").expect_err("no name");
-        assert_eq!(describe_error(&zero), "that is not a valid file name");
-        assert_eq!(describe_error(&Error::other("The disk is on fire")), "the disk is on fire");
+        assert_eq!(describe_io_error(&zero), "that is not a valid file name");
+        assert_eq!(describe_io_error(&Error::other("The disk is on fire")), "the disk is on fire");
     }
 }

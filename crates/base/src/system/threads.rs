@@ -7,7 +7,7 @@ use std::thread::{Builder, JoinHandle, available_parallelism};
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use super::{describe_error, memory};
+use super::{describe_io_error, memory};
 
 /// Address space used by a thread: its stack (with the standard library's default size) and its signal stack.
 pub const STACK_BYTES: u64 = (2 << 20) + (64 << 10);
@@ -37,7 +37,7 @@ pub fn logical_cpu_count() -> usize {
 ///
 /// # Errors
 /// Returns the message from [`describe_thread_start_failure`].
-pub fn logical_cpu_pool() -> std::result::Result<ThreadPool, String> {
+pub fn start_logical_cpu_pool() -> std::result::Result<ThreadPool, String> {
     let threads = logical_cpu_count();
     let failed = |error: &dyn Display| describe_thread_start_failure(threads, false, &error);
     check_thread_stack_memory(threads).map_err(|error| failed(&error))?;
@@ -75,7 +75,7 @@ pub fn describe_thread_start_failure(
             format!("out of memory: cannot start {what}; {fewer}raise the memory limit ({setting})")
         }
         None => {
-            let why = describe_error(&Error::other(error.to_string()));
+            let why = describe_io_error(&Error::other(error.to_string()));
             format!("cannot start {what}: {why}; {fewer}raise the limit on processes (`ulimit -u`)")
         }
     }

@@ -39,7 +39,7 @@ pub(crate) fn any_scene_completer() -> ArgValueCompleter {
 }
 
 /// Completes scenes and foreign files.
-pub(crate) fn scene_or_foreign_completer() -> ArgValueCompleter {
+pub(crate) fn scene_or_model_completer() -> ArgValueCompleter {
     ArgValueCompleter::new(
         PathCompleter::file().filter(|path| has_toml_extension(path) || has_foreign_extension(path)),
     )
@@ -92,7 +92,7 @@ fn key_assignment_candidates(text: &str, typed: &str) -> Vec<CompletionCandidate
     let keys = outline.iter().flat_map(of).chain(of_absent).flat_map(with_inner_keys);
     let of_key = |(path, key): (String, &'static KeyInfo)| {
         key_or_value_candidates(&format!("{path}.{}=", key.name), key.doc, typed, || {
-            named_values_for_key(key.kind, &outline)
+            completion_values_for_kind(key.kind, &outline)
         })
     };
     let of_type = |table: &OutlineTable| {
@@ -128,7 +128,7 @@ fn key_or_value_candidates(
 }
 
 /// Returns the named values for a key of type `kind`: keywords, colors, or names of tables in `outline`.
-fn named_values_for_key(kind: ValueKind, outline: &[OutlineTable]) -> Vec<DescribedValue> {
+fn completion_values_for_kind(kind: ValueKind, outline: &[OutlineTable]) -> Vec<DescribedValue> {
     let plain = |value: &str| (value.to_owned(), "");
     match kind {
         ValueKind::Words(list) => list().iter().map(|word| (word.name.to_owned(), word.meaning)).collect(),

@@ -20,7 +20,7 @@ use crate::tui::{ColorDepthChoice, PreviewChoice};
 #[derive(Clone, Debug, clap::Args)]
 pub struct RenderArgs {
     /// A scene (TOML, Mitsuba's XML, or pbrt) or a model: obj, off, ply, stl, glb, gltf
-    #[arg(required = true, add = candidates::scene_or_foreign_completer(), value_name = "SCENE")]
+    #[arg(required = true, add = candidates::scene_or_model_completer(), value_name = "SCENE")]
     pub scene: Option<PathBuf>,
     /// Render once, write the image and exit
     #[arg(long)]

@@ -155,11 +155,11 @@ fn format_p_value(probability: f64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::results::tests::results;
+    use super::super::results::tests::synthetic_results;
     use super::*;
 
     fn with(scale: impl Fn(&mut super::super::ImageMeasurement, usize)) -> Results {
-        let mut changed = results();
+        let mut changed = synthetic_results();
         for method in changed.scenes.iter_mut().flat_map(|scene| &mut scene.methods) {
             for step in &mut method.steps {
                 (0..).zip(&mut step.pictures).for_each(|(number, picture)| scale(picture, number));
@@ -170,7 +170,7 @@ mod tests {
 
     #[test]
     fn identical_runs_have_no_changes() {
-        let found = compare_runs(&results(), &results());
+        let found = compare_runs(&synthetic_results(), &synthetic_results());
         assert_eq!(found.len(), 2 * 2 * 2);
         assert!(
             found
@@ -183,7 +183,7 @@ mod tests {
     #[test]
     fn large_changes_are_significant() {
         let slower = with(|picture, _| picture.seconds *= 1.5);
-        let found = compare_runs(&results(), &slower);
+        let found = compare_runs(&synthetic_results(), &slower);
         let of = |quantity| found.iter().filter(move |change| change.quantity == quantity);
         assert!(
             of(ComparedQuantity::Seconds)
@@ -198,16 +198,16 @@ mod tests {
         let said = format_changes(&found, "old.json").join("\n");
         assert!(said.contains("a.toml, path: time × 1.500 (1.3") && said.contains("SLOWER (p "), "{said}");
         let noise = with(|picture, number| picture.seconds *= [1.05, 0.97, 0.99][number]);
-        assert!(compare_runs(&results(), &noise).iter().all(|change| !change.is_significant));
+        assert!(compare_runs(&synthetic_results(), &noise).iter().all(|change| !change.is_significant));
     }
 
     #[test]
     fn only_common_steps_are_compared() {
-        let mut other = results();
+        let mut other = synthetic_results();
         other.scenes[0].scene = "other.toml".to_owned();
         other.scenes[1].methods[0].name = "other".to_owned();
         other.scenes[1].methods[1].steps.truncate(1);
-        assert_eq!(compare_runs(&other, &results()).len(), 2);
+        assert_eq!(compare_runs(&other, &synthetic_results()).len(), 2);
         assert!(matches!(&format_changes(&[], "x.json")[..], [line] if line.starts_with("x.json ")));
     }
 }

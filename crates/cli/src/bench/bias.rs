@@ -38,7 +38,10 @@ impl SquaredBias {
 
 /// Estimates the squared bias from images with different seeds, or returns `None` if there are fewer than
 /// [`MIN_SEEDS`].
-pub fn estimate_bias(references: &IndependentReferences, pictures: &[RadianceImage]) -> Option<SquaredBias> {
+pub fn estimate_squared_bias(
+    references: &IndependentReferences,
+    pictures: &[RadianceImage],
+) -> Option<SquaredBias> {
     if pictures.len() < MIN_SEEDS {
         return None;
     }
@@ -152,7 +155,7 @@ mod tests {
             let pair = ImagePair::new(names, self.picture(0.02, 0.0, 1), self.picture(0.02, 0.0, 1));
             let references = IndependentReferences::new(pair.expect("a pair"));
             let pictures: Vec<_> = (0..seeds).map(|_| self.picture(0.2, offset, block)).collect();
-            estimate_bias(&references, &pictures).expect("enough seeds")
+            estimate_squared_bias(&references, &pictures).expect("enough seeds")
         }
     }
 
@@ -210,10 +213,11 @@ mod tests {
             noise.picture(0.0, 0.0, 1),
         );
         let references = IndependentReferences::new(pair.expect("a pair"));
-        let of =
-            |picture: RadianceImage| estimate_bias(&references, &vec![picture; 3]).expect("enough seeds");
+        let of = |picture: RadianceImage| {
+            estimate_squared_bias(&references, &vec![picture; 3]).expect("enough seeds")
+        };
         assert!(!of(noise.picture(0.0, 0.0, 1)).is_significant());
         assert!(of(noise.picture(0.0, 0.1, 1)).is_significant());
-        assert_eq!(estimate_bias(&references, &[noise.picture(0.0, 0.0, 1)]), None);
+        assert_eq!(estimate_squared_bias(&references, &[noise.picture(0.0, 0.0, 1)]), None);
     }
 }

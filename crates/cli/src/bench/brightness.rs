@@ -79,7 +79,7 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::bench::bias::estimate_bias;
+    use crate::bench::bias::estimate_squared_bias;
     use crate::compare::ImagePair;
     use crate::math::Vec3;
     use crate::math::random::unit_generator;
@@ -123,7 +123,7 @@ mod tests {
             let found = compare_brightness(&references, &pictures, true).expect("enough seeds");
             missed += u32::from(!found.is_biased());
             off.push((found.value + 0.01) / found.error);
-            let by_relmse = estimate_bias(&references, &pictures).expect("enough seeds");
+            let by_relmse = estimate_squared_bias(&references, &pictures).expect("enough seeds");
             assert!(!by_relmse.is_significant(), "seed {seed}: the bias should be undetectable in relMSE");
         }
         // One percent is 4.7 standard errors, and the threshold is 3.3. The test therefore misses 8 % of the

@@ -143,7 +143,7 @@ pub(super) fn store(
         sweep: None,
         losses: AttributeLossPolicy::Report(&|_| ()),
     };
-    write::atomic_with_policy(&path, &bytes, &guard, &CancelToken::new())
+    write::write_atomically_with_policy(&path, &bytes, &guard, &CancelToken::new())
 }
 
 /// Whether a file may be replaced because it is missing, empty or a (possibly damaged) cached reference.

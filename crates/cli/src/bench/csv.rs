@@ -38,12 +38,12 @@ fn quote_field(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::results::tests::results;
+    use super::super::results::tests::synthetic_results;
     use super::*;
 
     #[test]
     fn each_image_has_a_line_with_all_fields() {
-        let mut results = results();
+        let mut results = synthetic_results();
         results.scenes[1].scene = "odd, \"name\".toml".to_owned();
         let text = format_csv(&results);
         let lines: Vec<&str> = text.split_terminator("\r\n").collect();

@@ -1,6 +1,6 @@
 //! Measures one method on a scene, for all steps and seeds.
 
-use super::bias::estimate_bias;
+use super::bias::estimate_squared_bias;
 use super::brightness::compare_brightness;
 use super::methods::Method;
 use super::reference::{ReferenceFingerprints, SEEDS};
@@ -67,7 +67,7 @@ impl MethodMeasurer<'_> {
         {
             return Err(self.run.scene_changed_error());
         }
-        Ok(MethodAnalysis::new(self.method.name.clone(), setup_seconds(&first.report), steps))
+        Ok(MethodAnalysis::new(self.method.name.clone(), seconds_before_photons(&first.report), steps))
     }
 
     /// Chooses the next step from the previous steps and their durations in seconds.
@@ -122,7 +122,7 @@ impl MethodMeasurer<'_> {
             pictures.push(ImageMeasurement {
                 seed,
                 samples: report.image.samples.mean,
-                seconds: rendering_seconds(&report),
+                seconds: photon_and_render_seconds(&report),
                 relmse,
             });
             images.push(image);
@@ -231,18 +231,18 @@ fn summarize_step(
         relmse: median(&errors),
         spread: [least, most],
         uncertainty: images.first().map_or(0.0, |image| two.relmse_standard_error(image)),
-        bias: estimate_bias(two, images),
+        bias: estimate_squared_bias(two, images),
         brightness: None,
         pictures,
     }
 }
 
 /// Seconds spent on photon mapping and rendering for one image.
-fn rendering_seconds(report: &Report) -> f64 {
+fn photon_and_render_seconds(report: &Report) -> f64 {
     [Stage::Photons, Stage::Render].map(|stage| report.stages[stage as usize].seconds).iter().sum()
 }
 
 /// Seconds spent on the stages before photon mapping, which run once for all images.
-fn setup_seconds(report: &Report) -> f64 {
+fn seconds_before_photons(report: &Report) -> f64 {
     report.stages[..Stage::Photons as usize].iter().map(|stage| stage.seconds).sum()
 }

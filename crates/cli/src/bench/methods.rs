@@ -30,7 +30,7 @@ pub struct Method {
 
 /// Settings of a method, used to remove duplicates.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct MethodDedupKey {
+struct MethodSettings {
     integrator: Integrator,
     /// Photons and shadows, or `None` for path tracing, which ignores these settings.
     of_whitted: Option<(bool, ShadowMode)>,
@@ -46,7 +46,7 @@ pub fn methods_to_measure(scene: &Scene, toggles: &MethodSweep) -> Vec<Method> {
     } else {
         sweep_combinations(scene, toggles)
     };
-    let mut distinct: Vec<MethodDedupKey> = Vec::new();
+    let mut distinct: Vec<MethodSettings> = Vec::new();
     for settings in all {
         if !distinct.contains(&settings) {
             distinct.push(settings);
@@ -55,7 +55,7 @@ pub fn methods_to_measure(scene: &Scene, toggles: &MethodSweep) -> Vec<Method> {
     distinct.into_iter().map(|settings| create_method_from_settings(settings, toggles)).collect()
 }
 
-fn default_benchmark_methods(scene: &Scene) -> Vec<MethodDedupKey> {
+fn default_benchmark_methods(scene: &Scene) -> Vec<MethodSettings> {
     let own = (scene.render.integrator, scene.photons.enabled);
     let ways = [(Integrator::Path, false), (Integrator::Whitted, true), own];
     let of = |(integrator, photons)| {
@@ -70,7 +70,7 @@ fn default_benchmark_methods(scene: &Scene) -> Vec<MethodDedupKey> {
     ways.into_iter().map(of).collect()
 }
 
-fn sweep_combinations(scene: &Scene, toggles: &MethodSweep) -> Vec<MethodDedupKey> {
+fn sweep_combinations(scene: &Scene, toggles: &MethodSweep) -> Vec<MethodSettings> {
     let mut ways = Vec::new();
     for integrator in requested_or_scene_values(&toggles.integrators, scene.render.integrator) {
         for photons in requested_or_scene_values(&toggles.photons, scene.photons.enabled) {
@@ -96,14 +96,14 @@ fn normalize_method_settings(
     shadows: ShadowMode,
     clamp: f32,
     accel: Accel,
-) -> MethodDedupKey {
+) -> MethodSettings {
     let method = integrator.properties();
     let of_whitted = (method.gathers && method.honors_shadows).then_some((photons, shadows));
-    MethodDedupKey { integrator, of_whitted, clamp, accel }
+    MethodSettings { integrator, of_whitted, clamp, accel }
 }
 
 /// Creates a method, named after the requested settings.
-fn create_method_from_settings(settings: MethodDedupKey, toggles: &MethodSweep) -> Method {
+fn create_method_from_settings(settings: MethodSettings, toggles: &MethodSweep) -> Method {
     let mut words = vec![settings.integrator.name().to_owned()];
     if let Some((photons, shadows)) = settings.of_whitted {
         if photons {

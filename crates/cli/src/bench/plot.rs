@@ -43,7 +43,7 @@ pub fn draw_svg(results: &Results) -> Result<String, String> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::results::tests::results;
+    use super::super::results::tests::synthetic_results;
     use super::*;
 
     fn texts(svg: &str) -> Vec<String> {
@@ -54,7 +54,7 @@ mod tests {
 
     #[test]
     fn plots_contain_all_scenes_methods_and_axes() {
-        let svg = draw_svg(&results()).expect("a plot");
+        let svg = draw_svg(&synthetic_results()).expect("a plot");
         let texts = texts(&svg);
         for word in [
             "a.toml, 128×96",
@@ -85,7 +85,7 @@ mod tests {
 
     #[test]
     fn plots_accept_missing_and_negative_values() {
-        let mut some = results();
+        let mut some = synthetic_results();
         some.scenes[0].methods.clear();
         for step in &mut some.scenes[1].methods[0].steps {
             (step.relmse, step.spread) = (-1e-9, [-1e-8, 1e-9]);

@@ -129,7 +129,7 @@ impl ReferenceRenderer<'_> {
     ) -> Option<SceneReferences> {
         let stored = cache::load(self.cache?, &self.reference_cache_key(keys))
             .filter(|stored| amount.is_met_by_cached_references(stored.cost))?;
-        Some(scene_references_from_stored(stored, true, Vec::new(), None))
+        Some(scene_references_from_pair(stored, true, Vec::new(), None))
     }
 
     /// Renders both references. Calls `begin` before each one and passes it the number of references left.
@@ -162,7 +162,7 @@ impl ReferenceRenderer<'_> {
         let cache_error = self
             .cache
             .and_then(|folder| cache::store(folder, &self.reference_cache_key(&keys), &stored).err());
-        scene_references_from_stored(stored, false, warnings, cache_error.map(|error| error.to_string()))
+        scene_references_from_pair(stored, false, warnings, cache_error.map(|error| error.to_string()))
     }
 
     fn render_reference(
@@ -199,7 +199,7 @@ fn cache_key(
     key.finish()
 }
 
-fn scene_references_from_stored(
+fn scene_references_from_pair(
     stored: ReferencesWithCost,
     is_cached: bool,
     warnings: Vec<Diagnostic>,

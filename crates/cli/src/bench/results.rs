@@ -225,14 +225,14 @@ pub(super) mod tests {
     }
 
     /// A synthetic method with noise inversely proportional to time, plus a bias.
-    pub(crate) fn method(name: &str, noise: f64, bias: f64) -> MethodAnalysis {
+    pub(crate) fn synthetic_method(name: &str, noise: f64, bias: f64) -> MethodAnalysis {
         let steps = [1.0, 4.0, 16.0, 64.0]
             .map(|samples| synthetic_step_result(samples, samples * 0.01, noise / samples + bias, bias));
         MethodAnalysis::new(name.to_owned(), 0.003, steps.to_vec())
     }
 
     /// Two scenes with two methods each.
-    pub(crate) fn results() -> Results {
+    pub(crate) fn synthetic_results() -> Results {
         let scene = |name: &str| SceneResult {
             scene: name.to_owned(),
             width: 128,
@@ -244,7 +244,7 @@ pub(super) mod tests {
                 is_cached: false,
                 files: Vec::new(),
             },
-            methods: vec![method("path", 0.2, 0.0), method("whitted", 0.02, 0.01)],
+            methods: vec![synthetic_method("path", 0.2, 0.0), synthetic_method("whitted", 0.02, 0.01)],
         };
         Results {
             glimt: "0.1.0".to_owned(),
@@ -275,15 +275,15 @@ pub(super) mod tests {
 
     #[test]
     fn slopes_use_all_steps_and_the_last_two() {
-        let method = method("whitted", 0.02, 0.01);
+        let method = synthetic_method("whitted", 0.02, 0.01);
         let (all, last) = (method.slope.expect("a slope"), method.last_slope.expect("a slope"));
         assert!(all.value < -0.15 && last.value > -0.1, "{all:?} {last:?}");
-        assert!((self::method("path", 0.2, 0.0).slope.expect("a slope").value + 1.0).abs() < 1e-9);
+        assert!((self::synthetic_method("path", 0.2, 0.0).slope.expect("a slope").value + 1.0).abs() < 1e-9);
     }
 
     #[test]
     fn results_round_trip_through_json() {
-        let text = serde_json::to_string(&results()).expect("JSON");
-        assert_eq!(serde_json::from_str::<Results>(&text).expect("results"), results());
+        let text = serde_json::to_string(&synthetic_results()).expect("JSON");
+        assert_eq!(serde_json::from_str::<Results>(&text).expect("results"), synthetic_results());
     }
 }

@@ -154,12 +154,12 @@ fn describe_brightness(method: &MethodAnalysis) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::results::tests::results;
+    use super::super::results::tests::synthetic_results;
     use super::*;
 
     #[test]
     fn table_fits_80_columns_and_reports_bias() {
-        let lines = format_results(&results());
+        let lines = format_results(&synthetic_results());
         assert!(lines.iter().all(|line| line.chars().count() <= 80), "{}", lines.join("\n"));
         assert_eq!(lines[0], "a.toml, 128×96 pixels, 3 seeds");
         assert_eq!(lines[1], "references: path, 2 × 4096 samples (64 × the largest step), noise 1.00e-5");

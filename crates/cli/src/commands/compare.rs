@@ -17,13 +17,14 @@ use crate::film::RadianceImage;
 use crate::output::part::is_part_or_checkpoint;
 use crate::output::write::{self, ExistingFilePolicy};
 use crate::output::{
-    self, AttributeLossPolicy, EncodeOptions, FileIdentity, Format, OutputError, WriteWarning, is_same_file,
+    self, AttributeLossPolicy, EncodeOptions, FileIdentity, Format, OutputError, WriteWarning,
+    may_be_same_file,
 };
-use crate::system::threads::logical_cpu_pool;
+use crate::system::threads::start_logical_cpu_pool;
 use crate::tui::wrap_text;
 
 pub(crate) fn run(args: &CompareArgs, console: &Console) -> Exit {
-    match logical_cpu_pool() {
+    match start_logical_cpu_pool() {
         Ok(pool) => run_comparison_in_pool(&pool, args, console).unwrap_or_else(|exit| exit),
         Err(message) => console.print_error(Exit::FAILED, &message),
     }
@@ -144,7 +145,7 @@ impl<'a> ErrorImageOutput<'a> {
         let warnings = RefCell::new(Vec::new());
         let losses = AttributeLossPolicy::Report(&|warning| warnings.borrow_mut().push(warning));
         let guard = ExistingFilePolicy { is_kept: &is_kept, may_replace: &may_replace, sweep: None, losses };
-        write::atomic_with_policy(self.path, &bytes, &guard, &token)?;
+        write::write_atomically_with_policy(self.path, &bytes, &guard, &token)?;
         Ok(warnings.into_inner())
     }
 }
@@ -159,7 +160,7 @@ fn check_not_input(path: &Path, real: &Path, args: &CompareArgs) -> Result<(), O
         );
         return Err(OutputError::Refused { reason });
     }
-    match [&args.a, &args.b].into_iter().find(|input| is_same_file(real, input)) {
+    match [&args.a, &args.b].into_iter().find(|input| may_be_same_file(real, input)) {
         Some(input) => {
             let other = if path == input { String::new() } else { format!("{}, ", input.display()) };
             let name = path.display();

@@ -91,7 +91,7 @@ fn path_explanation(path: &str) -> Option<String> {
                 return Some(table_type_details(table, kind));
             }
             if *second == "type" && !table.types.is_empty() {
-                return Some(format_type_list(table));
+                return Some(format_table_types(table));
             }
             found(table_keys_with_paths(table).filter(|(_, key)| key.name == *second).collect())
         }
@@ -103,7 +103,7 @@ fn path_explanation(path: &str) -> Option<String> {
             }
             let kind = table.find_type_or_default(Some(second))?;
             if *third == "type" {
-                return Some(format_type_list(table));
+                return Some(format_table_types(table));
             }
             let path = format!("{}.{}", table.name, kind.name);
             found(
@@ -178,14 +178,15 @@ fn key_summary(path: &str, key: &KeyInfo) -> String {
 /// Describes a table, with one line per type and key.
 fn table_details(table: &'static TableInfo) -> String {
     let head = format!("{}\n    {}\n\n", table.header(), without_backticks_with_period(table.doc));
-    let types = if table.types.is_empty() { String::new() } else { format!("{}\n", format_type_list(table)) };
+    let types =
+        if table.types.is_empty() { String::new() } else { format!("{}\n", format_table_types(table)) };
     let inner =
         |(header, inner): (String, &TableInfo)| format!("    {header:<26}{}\n", without_backticks(inner.doc));
     let tables: String = table.inner_headers().map(inner).collect();
     format!("{head}{types}{tables}{}", format_key_list(table.keys.iter()))
 }
 
-fn format_type_list(table: &TableInfo) -> String {
+fn format_table_types(table: &TableInfo) -> String {
     let default = table.types.first().map_or("", |kind| kind.name);
     let line = |kind: &TableTypeInfo| {
         format!("    type = {:<15}{}\n", format!("\"{}\"", kind.name), without_backticks(kind.doc))

@@ -119,13 +119,14 @@ fn disambiguate_path_argument(path: &Path) -> String {
 
 /// Returns the command that renders one part. `index` is a shell expression for the part's number.
 fn part_render_command(args: &FarmArgs, index: &str) -> String {
-    let (scene, part) = (quote_word(&disambiguate_path_argument(&args.scene)), part_file_name(args, index));
+    let (scene, part) =
+        (quote_word(&disambiguate_path_argument(&args.scene)), shell_quoted_part_path(args, index));
     let options: String = args.options.iter().map(|option| format!(" {}", quote_word(option))).collect();
     format!("glimt {scene} --once -o {part} --shard {index}/{} --resume{options}", args.shards)
 }
 
 /// Returns the file name for one part, quoted for the shell.
-fn part_file_name(args: &FarmArgs, index: &str) -> String {
+fn shell_quoted_part_path(args: &FarmArgs, index: &str) -> String {
     format!("{}.{index}.part", quote_word(&disambiguate_path_argument(&args.output)))
 }
 

@@ -25,7 +25,7 @@ pub(crate) fn run(args: &InfoArgs, console: &Console) -> Exit {
             Err(error) => return console.print_error(Exit::FAILED, &error.to_string()),
         }
     } else {
-        console.print_trusted_text(&as_text(&args.image, &info));
+        console.print_trusted_text(&image_info_to_text(&args.image, &info));
     }
     if info.is_written_by_glimt() { Exit::DONE } else { Exit::FAILED }
 }
@@ -55,7 +55,7 @@ pub(crate) fn report_image_instead_of_scene(path: &Path, is_json: bool, console:
     } else {
         console.print_diagnostics(&[*problem]);
         console.print_lines_to_stderr(
-            &info.map_or_else(|error| format!("{error}\n"), |info| as_text(path, &info)),
+            &info.map_or_else(|error| format!("{error}\n"), |info| image_info_to_text(path, &info)),
         );
     }
     Some(Exit::WRONG)
@@ -81,7 +81,7 @@ fn image_info_to_json(path: &Path, info: &ImageFileInfo) -> Value {
 const MAX_NAME_COLUMNS: usize = 40;
 
 /// Formats one line about the file, followed by one line per setting.
-fn as_text(path: &Path, info: &ImageFileInfo) -> String {
+fn image_info_to_text(path: &Path, info: &ImageFileInfo) -> String {
     let name = path.to_string_lossy();
     let size = info.size.map_or(String::new(), |(width, height)| format!(", {width}×{height}"));
     let frames = info.frames.map_or(String::new(), |frames| format!(", {frames} frames"));
@@ -113,7 +113,7 @@ mod tests {
                 settings: vec![(name.clone(), "value".to_owned())],
                 ..ImageFileInfo::default()
             };
-            let text = as_text(Path::new("a.png"), &info);
+            let text = image_info_to_text(Path::new("a.png"), &info);
             assert!(text.contains(&format!("{name}  value\n")) || length < 40, "{length}");
             assert!(text.contains("value"), "{length}");
         }

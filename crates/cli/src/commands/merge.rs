@@ -19,21 +19,21 @@ use crate::film::Film;
 use crate::film::tone::tone_map_to_8_bits;
 use crate::merge_block::InPlaceTerminalBlock;
 use crate::output::part::{self, MergedParts, PartError, PartFile};
-use crate::output::write::{ExistingFilePolicy, atomic_with_policy};
+use crate::output::write::{ExistingFilePolicy, write_atomically_with_policy};
 use crate::output::{
-    self, AttributeLossPolicy, FilmEncodingSettings, Format, OutputError, is_same_file, scene_path,
+    self, AttributeLossPolicy, FilmEncodingSettings, Format, OutputError, may_be_same_file, scene_path,
 };
 use crate::progress::{bar_style_from_template, json_line};
 use crate::scene::sanitize::{escape_and_truncate, escape_invisible_chars};
 use crate::signals;
-use crate::system::threads::logical_cpu_pool;
+use crate::system::threads::start_logical_cpu_pool;
 use crate::tui::{NamedImage, images_as_text};
 
 /// Polling interval for new parts.
 const POLL_INTERVAL: Duration = Duration::from_millis(500);
 
 pub(crate) fn run(args: &MergeArgs, console: &Console) -> Exit {
-    let pool = match logical_cpu_pool() {
+    let pool = match start_logical_cpu_pool() {
         Ok(pool) => pool,
         Err(message) => return console.print_error(Exit::FAILED, &message),
     };
@@ -77,7 +77,7 @@ impl MergeCommand<'_> {
             let message = format!("cannot write {name}: it is a part; name the output before the parts");
             return Err(self.console.print_error(Exit::WRONG, &message));
         }
-        if self.args.parts.iter().any(|part| is_same_file(part, out)) {
+        if self.args.parts.iter().any(|part| may_be_same_file(part, out)) {
             let message = format!("{name} is both the output and a part");
             return Err(self.console.print_error(Exit::WRONG, &message));
         }
@@ -176,7 +176,7 @@ impl MergeCommand<'_> {
                     // Report mismatched parts as soon as they appear.
                     part::check_and_list_missing(&parts).map_err(|error| self.report_part_error(&error))?;
                 }
-                self.report_parts(parts.len(), &unfinished, &words);
+                self.report_completed_parts(parts.len(), &unfinished, &words);
                 reported = Some(state);
             }
             if waiting.is_empty() {
@@ -209,7 +209,7 @@ impl MergeCommand<'_> {
     }
 
     /// Reports the parts on stderr, unless the terminal already shows the same text above the image.
-    fn report_parts(&self, count: usize, unfinished: &[&Path], words: &str) {
+    fn report_completed_parts(&self, count: usize, unfinished: &[&Path], words: &str) {
         match self.args.progress {
             ProgressMode::None => {}
             ProgressMode::Json => {
@@ -305,13 +305,13 @@ impl MergeCommand<'_> {
         set_relative_scene_path(&mut finish, parts, out);
         let film = &merged.film;
         let may_replace = |real: &Path| {
-            let is_given = self.args.parts.iter().any(|part| is_same_file(part, real));
+            let is_given = self.args.parts.iter().any(|part| may_be_same_file(part, real));
             let is_part = is_given || part::is_part_or_checkpoint(real);
             let why = is_part.then(|| format!("cannot write {}: it is a part", out.display()));
             let why = why.map_or_else(|| self.message_if_render_input(inputs, real), |why| Ok(Some(why)))?;
             why.map_or(Ok(()), |reason| Err(OutputError::Refused { reason }))
         };
-        let is_kept = |path: &Path| self.args.parts.iter().any(|part| is_same_file(part, path));
+        let is_kept = |path: &Path| self.args.parts.iter().any(|part| may_be_same_file(part, path));
         let tell = |warning| self.console.print_line_to_stderr(&format!("warning: {warning}"));
         let guard = ExistingFilePolicy {
             is_kept: &is_kept,
@@ -322,7 +322,7 @@ impl MergeCommand<'_> {
         let bytes = self.pool.install(|| {
             finish.encode_with_film_metadata(film, &finish.extract_quantity(film), &[], format, token)
         });
-        let written = bytes.and_then(|bytes| atomic_with_policy(out, &bytes, &guard, token));
+        let written = bytes.and_then(|bytes| write_atomically_with_policy(out, &bytes, &guard, token));
         written.map_err(|error| match error {
             OutputError::Canceled(_) => Exit::FAILED,
             other => self.console.print_error(Exit::FAILED, &other.to_string()),

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 
 use super::{Reporter, describe_samples, format_seconds};
-use crate::pipeline::protocol::{AssetProgress, Event, RenderProgress, Stage, StageReport, Status};
+use crate::pipeline::protocol::{AssetProgress, Event, RenderProgress, Stage, StageReport, StageStatus};
 use crate::pipeline::words::Eta;
 use crate::scene::sanitize::escape_invisible_chars;
 
@@ -34,7 +34,7 @@ impl ProgressBars {
     }
 
     fn show_stage(&mut self, stage: &StageReport) {
-        if stage.status == Status::Running {
+        if stage.status == StageStatus::Running {
             self.stage.set_message(stage.name.name());
             self.stage.tick();
         } else if stage.name == Stage::Accel {

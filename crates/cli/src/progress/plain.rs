@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use super::{Reporter, describe_samples, format_seconds};
 use crate::console::Console;
-use crate::pipeline::protocol::{AssetProgress, Event, RenderProgress, StageReport, Status};
+use crate::pipeline::protocol::{AssetProgress, Event, RenderProgress, StageReport, StageStatus};
 use crate::pipeline::words::Eta;
 
 /// Maximum time between lines during a render.
@@ -65,7 +65,7 @@ impl PlainReporter {
 impl Reporter for PlainReporter {
     fn handle_event(&mut self, event: &Event) {
         if let Event::Stage { stage, .. } = event
-            && stage.status != Status::Running
+            && stage.status != StageStatus::Running
         {
             self.console.print_line_to_stderr(&stage_status_line(stage));
         } else if let Event::Asset { progress, .. } = event
@@ -91,12 +91,13 @@ fn format_progress(progress: &RenderProgress) -> String {
 /// Describes a finished stage, as in `parse done 0.40 ms`.
 pub(super) fn stage_status_line(stage: &StageReport) -> String {
     let status = match stage.status {
-        Status::Running => "running",
-        Status::Done => "done",
-        Status::Reused => "reused",
-        Status::Skipped => "skipped",
+        StageStatus::Running => "running",
+        StageStatus::Done => "done",
+        StageStatus::Reused => "reused",
+        StageStatus::Skipped => "skipped",
     };
-    let time = if stage.status == Status::Skipped { String::new() } else { format_seconds(stage.seconds) };
+    let time =
+        if stage.status == StageStatus::Skipped { String::new() } else { format_seconds(stage.seconds) };
     format!("{:<8} {status:<7} {time:>9}  {}", stage.name.name(), stage.why).trim_end().to_owned()
 }
 

@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use crate::control::{CancelToken, Canceled};
 use crate::geometry::mesh::TriangleMesh;
 use crate::system::file::FileStamp;
-use crate::system::{RAISE_FILE_LIMIT, describe_error, is_too_many_open_files};
+use crate::system::{RAISE_FILE_LIMIT, describe_io_error, is_too_many_open_files};
 
 pub use gzip::{GzipFile, read_gzip_file};
 pub use text_file::{TextFile, read_text_file};
@@ -93,7 +93,7 @@ impl AssetError {
     pub fn from_io(path: &Path, error: &io::Error) -> Self {
         match is_too_many_open_files(error) {
             true => Self::TooManyOpenFiles { path: path.to_owned() },
-            false => Self::unreadable(path, describe_error(error)),
+            false => Self::unreadable(path, describe_io_error(error)),
         }
     }
 

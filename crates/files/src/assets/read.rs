@@ -173,7 +173,7 @@ mod tests {
     use super::*;
     use crate::assets::expect_rejection;
     use crate::control::ignore_progress;
-    use crate::system::describe_error;
+    use crate::system::describe_io_error;
     use std::fs;
     use std::sync::Mutex;
 
@@ -188,7 +188,7 @@ mod tests {
         let reason = |path: &Path| expect_rejection(read_bytes(path, 100, monitor(&token))).1;
         assert_eq!(reason(folder.path()), not_regular_file_message(FileKind::Folder));
         let missing = std::io::Error::from_raw_os_error(nix::libc::ENOENT);
-        assert_eq!(reason(&folder.path().join("none.obj")), describe_error(&missing));
+        assert_eq!(reason(&folder.path().join("none.obj")), describe_io_error(&missing));
         let long = folder.path().join("long");
         fs::write(&long, [0; 101]).expect("written");
         assert!(reason(&long).contains("101"));
@@ -275,7 +275,7 @@ mod tests {
         let cycle = folder.path().join("cycle");
         std::os::unix::fs::symlink(&cycle, &cycle).expect("a link");
         let link_loop = std::io::Error::from_raw_os_error(nix::libc::ELOOP);
-        assert_eq!(reason(&cycle), describe_error(&link_loop));
+        assert_eq!(reason(&cycle), describe_io_error(&link_loop));
     }
 
     #[test]

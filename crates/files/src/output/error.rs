@@ -4,7 +4,7 @@ use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
 use super::{AnimationFormat, Format};
-use crate::system::{RAISE_FILE_LIMIT, describe_error, is_too_many_open_files};
+use crate::system::{RAISE_FILE_LIMIT, describe_io_error, is_too_many_open_files};
 
 /// Reason why an image could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -73,7 +73,7 @@ pub enum OutputError {
     #[error("canceled")]
     Canceled(#[from] crate::control::Canceled),
     /// The operating system reported an error.
-    #[error("cannot write {}: {}; {}", path.display(), describe_error(source), write_error_advice(source))]
+    #[error("cannot write {}: {}; {}", path.display(), describe_io_error(source), write_error_advice(source))]
     File {
         /// The path as specified by the user.
         path: PathBuf,

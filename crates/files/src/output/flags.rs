@@ -58,7 +58,7 @@ mod tests {
             if let Err(error) = set(&path, flag).and_then(|()| set(folder.path(), IFlags::NODUMP)) {
                 return eprintln!("skipped: flags are not supported here: {error}");
             }
-            write::atomic(&path, b"new").expect("written");
+            write::write_atomically(&path, b"new").expect("written");
             assert_eq!(std::fs::read(&path).expect("read"), b"new");
             assert_eq!(flags(&path).expect("flags") & USER_FLAGS, flag);
         }

@@ -48,7 +48,7 @@ fn backup_path(target: &Path) -> PathBuf {
 }
 
 /// A replacement in progress. The steps are [`Self::stage_at_backup_path`], [`Self::swap`] and
-/// [`Self::finish_if_old_text_matches`].
+/// [`Self::finish_or_restore_old`].
 pub(super) struct FileReplacement<'a> {
     target: &'a Path,
     held: PathBuf,
@@ -90,7 +90,7 @@ impl<'a> FileReplacement<'a> {
     ///
     /// # Errors
     /// A system error. A backup may remain.
-    pub(super) fn finish_if_old_text_matches(self) -> io::Result<Option<File>> {
+    pub(super) fn finish_or_restore_old(self) -> io::Result<Option<File>> {
         let text = fs::read(&self.held)?;
         if text == self.expected {
             // If this fails, the backup is handled at the next start.
@@ -184,7 +184,7 @@ pub(super) fn replace_if_unchanged(
     expected: &[u8],
 ) -> io::Result<Option<File>> {
     match FileReplacement::stage_at_backup_path(new, target, expected)?.swap() {
-        Ok(replacement) => replacement.finish_if_old_text_matches(),
+        Ok(replacement) => replacement.finish_or_restore_old(),
         // The file system cannot exchange names, or the file no longer exists.
         Err((error, Some(new))) if error.kind() != ErrorKind::PermissionDenied => {
             ReplacementWithoutExchange::move_old_to_backup_path(target, expected)?
@@ -376,7 +376,7 @@ mod tests {
             FileReplacement::stage_at_backup_path(folder.new_text(), &scene, OLD.as_bytes()).expect("begun");
         let replacement = replacement.swap().map_err(|(error, _)| error).expect("swapped");
         folder.save("second");
-        assert!(replacement.finish_if_old_text_matches().expect("no error").is_none());
+        assert!(replacement.finish_or_restore_old().expect("no error").is_none());
         assert!(folder.has("second"));
         assert_eq!(fs::read_dir(folder.folder.path()).expect("a folder").count(), 1);
     }

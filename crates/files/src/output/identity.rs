@@ -58,7 +58,7 @@ impl FileIdentity {
 /// Properties that help to identify an existing file where [`FileIdentity`] is not sufficient. Some
 /// case-insensitive file systems, such as FAT and some network file systems, have no stable inode numbers.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct FallbackFileIdentity {
+pub struct ApproximateFileIdentity {
     real: PathBuf,
     /// Folder in lowercase.
     folder: PathBuf,
@@ -68,7 +68,7 @@ pub struct FallbackFileIdentity {
     modified: (i64, i64),
 }
 
-impl FallbackFileIdentity {
+impl ApproximateFileIdentity {
     /// Returns the fallback identity of the file at a path, or `None` if there is no regular file.
     pub fn from_path(path: &Path) -> Option<Self> {
         let found = fs::metadata(path).ok().filter(fs::Metadata::is_file)?;
@@ -102,11 +102,11 @@ fn have_same_content(a: &Path, b: &Path) -> bool {
 }
 
 /// Whether two paths refer to the same file, existing or not. Also true if they may refer to the same file
-/// according to their [`FallbackFileIdentity`].
-pub fn is_same_file(a: &Path, b: &Path) -> bool {
+/// according to their [`ApproximateFileIdentity`].
+pub fn may_be_same_file(a: &Path, b: &Path) -> bool {
     let Some(identity) = FileIdentity::from_existing_or_new_path(a) else { return false };
     let are_alike =
-        || Some(FallbackFileIdentity::from_path(a)?.may_equal(&FallbackFileIdentity::from_path(b)?));
+        || Some(ApproximateFileIdentity::from_path(a)?.may_equal(&ApproximateFileIdentity::from_path(b)?));
     FileIdentity::from_existing_or_new_path(b) == Some(identity) || are_alike().unwrap_or(false)
 }
 
@@ -178,10 +178,10 @@ mod tests {
             ("other/t.png", false),
             ("none", false),
         ] {
-            assert_eq!(is_same_file(&at(name), &at("t.png")), is_one, "{name}");
+            assert_eq!(may_be_same_file(&at(name), &at("t.png")), is_one, "{name}");
         }
-        assert!(!is_same_file(folder.path(), folder.path()), "folders are not files");
-        assert!(is_same_file(&at("none"), &at("other/../none")), "a file that does not exist yet");
+        assert!(!may_be_same_file(folder.path(), folder.path()), "folders are not files");
+        assert!(may_be_same_file(&at("none"), &at("other/../none")), "a file that does not exist yet");
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Encodes images and writes files.
 //!
-//! [`check_image_target`] is called before rendering. [`encode`] encodes in memory. [`write::atomic`] writes to
+//! [`check_image_target`] is called before rendering. [`encode`] encodes in memory. [`write::write_atomically`] writes to
 //! disk and leaves the file either complete or unchanged. Two paths with the same [`FileIdentity`] refer to
 //! the same file.
 
@@ -39,7 +39,7 @@ pub use develop::FilmEncodingSettings;
 pub use error::OutputError;
 pub use exr::read_mean_luminance_error;
 pub use format::{AnimationFormat, BitDepth, Format};
-pub use identity::{FallbackFileIdentity, FileIdentity, is_same_file};
+pub use identity::{ApproximateFileIdentity, FileIdentity, may_be_same_file};
 pub use origin::{
     ReplaceCheckResult, check_image_replacement, check_json_replacement, check_plot_replacement,
     check_table_replacement, scene_name_in_png, sign_plot,

@@ -54,7 +54,7 @@ impl ReplaceCheckResult {
             Self::Own => None,
             Self::Foreign(kind) => Some(format!("the existing file is not {kind} that glimt wrote")),
             Self::Unreadable(error) => {
-                Some(format!("the existing file cannot be read: {}", crate::system::describe_error(error)))
+                Some(format!("the existing file cannot be read: {}", crate::system::describe_io_error(error)))
             }
         }
     }
@@ -178,7 +178,7 @@ mod tests {
         for errno in [nix::libc::EACCES, nix::libc::EMFILE] {
             let error = || io::Error::from_raw_os_error(errno);
             let reason = ReplaceCheckResult::Unreadable(error()).reason_to_keep().expect("it is kept");
-            assert!(reason.ends_with(&crate::system::describe_error(&error())), "{reason}");
+            assert!(reason.ends_with(&crate::system::describe_io_error(&error())), "{reason}");
         }
         assert!(
             ReplaceCheckResult::Foreign("a report")

@@ -116,7 +116,7 @@ mod tests {
 
     fn refused(path: &std::path::Path) -> String {
         let before = check_image_target(path).expect_err("refused before rendering").to_string();
-        let after = write::atomic(path, b"new").expect_err("refused when writing").to_string();
+        let after = write::write_atomically(path, b"new").expect_err("refused when writing").to_string();
         assert_eq!(before, after);
         after
     }
@@ -149,7 +149,7 @@ mod tests {
             assert_eq!(fs::read_dir(&directory).expect("a directory").count(), 1, "{words}: {called}");
             assert_eq!(fs::read(&old).expect("read"), b"old");
         }
-        write::atomic(&link, b"new").expect("replaced without flags");
+        write::write_atomically(&link, b"new").expect("replaced without flags");
         assert_eq!(fs::read(&old).expect("read"), b"new");
     }
 
@@ -189,13 +189,13 @@ mod tests {
                 folder.path().display()
             );
             assert_eq!(refused(&other), expected);
-            write::atomic(&own, b"new").expect("its own file");
-            write::atomic(&folder.path().join("new.png"), b"new").expect("a new file");
+            write::write_atomically(&own, b"new").expect("its own file");
+            write::write_atomically(&folder.path().join("new.png"), b"new").expect("a new file");
         });
         assert_eq!(fs::read(&other).expect("read"), b"old");
         assert_eq!(fs::read_dir(folder.path()).expect("a folder").count(), 3);
-        write::atomic(&own, b"root's").expect("root may replace the file");
+        write::write_atomically(&own, b"root's").expect("root may replace the file");
         permit(0o777);
-        as_nobody(&|| write::atomic(&other, b"new").expect("not sticky"));
+        as_nobody(&|| write::write_atomically(&other, b"new").expect("not sticky"));
     }
 }

@@ -119,7 +119,7 @@ fn probe_unnamed_creation(_: &Path) -> io::Result<()> {
 pub(super) fn remove_stale_files(directory: &Path, is_kept: &dyn Fn(&Path) -> bool) {
     for path in stale_entries(directory) {
         if path.symlink_metadata().is_ok_and(|found| found.is_file()) && !is_kept(&path) {
-            let _ = remove_if_stale(&path, |path| fs::remove_file(path));
+            let _ = remove_if_unlocked(&path, |path| fs::remove_file(path));
         }
     }
 }
@@ -128,7 +128,7 @@ pub(super) fn remove_stale_files(directory: &Path, is_kept: &dyn Fn(&Path) -> bo
 pub(super) fn remove_stale_folders(directory: &Path) {
     for path in stale_entries(directory) {
         if path.symlink_metadata().is_ok_and(|found| found.is_dir()) {
-            let _ = remove_if_stale(&path, remove_folder_and_contents);
+            let _ = remove_if_unlocked(&path, remove_folder_and_contents);
         }
     }
 }
@@ -143,7 +143,7 @@ fn has_dead_writer(name: &OsStr) -> bool {
     parse_writer(name).is_some_and(|writer| writer.has_ended())
 }
 
-fn remove_if_stale(path: &Path, remove: impl Fn(&Path) -> io::Result<()>) -> io::Result<()> {
+fn remove_if_unlocked(path: &Path, remove: impl Fn(&Path) -> io::Result<()>) -> io::Result<()> {
     // The file may have been replaced with a link or a pipe since it was checked.
     let flags = OFlag::O_NOFOLLOW | OFlag::O_NONBLOCK;
     let file = OpenOptions::new().read(true).custom_flags(flags.bits()).open(path)?;
@@ -200,7 +200,7 @@ pub(super) mod tests {
     use super::*;
 
     /// Returns a temporary name for a process that has ended on this machine.
-    pub(in crate::output) fn dead_name(name: &str) -> OsString {
+    pub(in crate::output) fn stale_temporary_name(name: &str) -> OsString {
         temporary_name(OsStr::new(name), &dead_process())
     }
 
@@ -252,7 +252,7 @@ pub(super) mod tests {
             fs::write(&path, "half").expect("a file");
             path
         };
-        let stale = write(dead_name("b.png"));
+        let stale = write(stale_temporary_name("b.png"));
         // The writers of these files may be alive.
         let kept = [
             write(foreign_temporary_name("b.png")),

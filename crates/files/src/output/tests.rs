@@ -1,6 +1,6 @@
 use std::io::Cursor;
 
-use super::temporary::tests::dead_name;
+use super::temporary::tests::stale_temporary_name;
 use super::write::Durability;
 use super::*;
 use crate::film::tone::{Tonemap, tone_map_to_8_bits, tone_map_to_16_bits};
@@ -333,7 +333,7 @@ fn canceled_images_are_not_encoded_or_written() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("a.png");
     std::fs::write(&path, "old").expect("written");
-    let stopped = write::atomic_with_policy(&path, b"new", &NOTHING_KEPT, &token);
+    let stopped = write::write_atomically_with_policy(&path, b"new", &NOTHING_KEPT, &token);
     assert!(matches!(stopped, Err(OutputError::Canceled(_))));
     assert_eq!(std::fs::read(&path).expect("read"), b"old");
     assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 1);
@@ -347,9 +347,9 @@ fn each_folder_is_searched_once() {
     let write_two = |guard: &write::ExistingFilePolicy<'_>| {
         let mut kept = Vec::new();
         for at in [folder.path(), &other].repeat(2) {
-            let stale = at.join(dead_name("stale.png"));
+            let stale = at.join(stale_temporary_name("stale.png"));
             std::fs::write(&stale, "half").expect("written");
-            write::atomic_with_policy(&at.join("a.png"), b"new", guard, &CancelToken::new())
+            write::write_atomically_with_policy(&at.join("a.png"), b"new", guard, &CancelToken::new())
                 .expect("written");
             kept.push(stale.exists());
         }
@@ -419,7 +419,8 @@ fn guards_check_the_link_target_after_writing() {
         Err(OutputError::Refused { reason: "no".to_owned() })
     };
     let guard = write::ExistingFilePolicy { may_replace: &may_replace, ..NOTHING_KEPT };
-    let refused = write::atomic_with_policy(&link, b"new", &guard, &CancelToken::new()).expect_err("refused");
+    let refused =
+        write::write_atomically_with_policy(&link, b"new", &guard, &CancelToken::new()).expect_err("refused");
     assert_eq!((refused.to_string().as_str(), asked.get(), entries()), ("no", 1, 2));
     assert_eq!(std::fs::read(&real).expect("read"), b"old");
 }
@@ -451,7 +452,7 @@ fn replacing_a_file_grants_no_permissions() {
             let guard = write::ExistingFilePolicy { losses, ..NOTHING_KEPT };
             setfsgid(Gid::from_raw(65534));
             setfsuid(Uid::from_raw(65534));
-            write::atomic_with_policy(&path, b"new", &guard, &CancelToken::new())
+            write::write_atomically_with_policy(&path, b"new", &guard, &CancelToken::new())
         };
         std::thread::scope(|scope| {
             std::thread::Builder::new()
@@ -482,7 +483,7 @@ fn concurrent_saves_are_not_overwritten() {
     let swap = |may_replace: &dyn Fn(&Path) -> Result<(), OutputError>| {
         std::fs::write(&path, "read").expect("written");
         let guard = write::ExistingFilePolicy { may_replace, ..NOTHING_KEPT };
-        write::atomic_if_unchanged(&path, b"read", b"new", &guard, &CancelToken::new())
+        write::write_atomically_if_unchanged(&path, b"read", b"new", &guard, &CancelToken::new())
     };
     let has = |text: &str| std::fs::read(&path).expect("read") == text.as_bytes();
     let is_as_read = |path: &Path| match std::fs::read(path) {

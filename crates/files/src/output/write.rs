@@ -19,7 +19,7 @@ use super::resolve_path::{self, TargetFile, WriteTarget};
 use super::temporary::{self, TemporaryFile};
 use super::{AttributeLossPolicy, FileIdentity, OutputError, WriteWarning, cancelable, held};
 use crate::control::CancelToken;
-use crate::system::describe_error;
+use crate::system::describe_io_error;
 
 /// Path for standard output. The path is not opened, because opening fails for sockets.
 pub const STDOUT: &str = "/dev/stdout";
@@ -35,10 +35,10 @@ pub const STDOUT: &str = "/dev/stdout";
 /// # Errors
 /// The file cannot be written. The error contains the path, the system's message and advice. The old file is
 /// unchanged, and the temporary file is removed.
-pub fn atomic(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
+pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
     let losses = AttributeLossPolicy::Report(&|_| ());
     let guard = ExistingFilePolicy { is_kept: &|_| false, may_replace: &|_| Ok(()), sweep: None, losses };
-    atomic_with_policy(path, bytes, &guard, &CancelToken::new())
+    write_atomically_with_policy(path, bytes, &guard, &CancelToken::new())
 }
 
 /// Creates a file without overwriting an existing one. Leaves no partial file on failure.
@@ -83,26 +83,26 @@ impl SweptFolders {
     }
 }
 
-/// Like [`atomic`], but with a policy. Can be canceled until the new file is complete.
+/// Like [`write_atomically`], but with a policy. Can be canceled until the new file is complete.
 ///
 /// # Errors
-/// Any error from [`atomic`] or `guard`, or [`OutputError::Canceled`].
-pub fn atomic_with_policy(
+/// Any error from [`write_atomically`] or `guard`, or [`OutputError::Canceled`].
+pub fn write_atomically_with_policy(
     path: &Path,
     bytes: &[u8],
     guard: &ExistingFilePolicy<'_>,
     token: &CancelToken,
 ) -> Result<(), OutputError> {
     let content = |file: &mut dyn Write| cancelable::write_all(file, bytes, token);
-    atomic_from_callback(path, &content, guard, token, Durability::Power).map(drop)
+    write_atomically_from_callback(path, &content, guard, token, Durability::Power).map(drop)
 }
 
-/// Like [`atomic_with_policy`], but replaces the file only if it has the expected content. If the content has
+/// Like [`write_atomically_with_policy`], but replaces the file only if it has the expected content. If the content has
 /// changed, the file is kept and `guard` determines the error.
 ///
 /// # Errors
-/// Same as [`atomic_with_policy`].
-pub fn atomic_if_unchanged(
+/// Same as [`write_atomically_with_policy`].
+pub fn write_atomically_if_unchanged(
     path: &Path,
     expected: &[u8],
     bytes: &[u8],
@@ -124,13 +124,13 @@ pub enum Durability {
     Power,
 }
 
-/// Like [`atomic_with_policy`], but for generated content. `content` must write all bytes each time it is
+/// Like [`write_atomically_with_policy`], but for generated content. `content` must write all bytes each time it is
 /// called. Returns the new file, which stays locked until it is closed, or `None` if the target was written
 /// in place.
 ///
 /// # Errors
-/// Any error from [`atomic_with_policy`] or `content`.
-pub fn atomic_from_callback(
+/// Any error from [`write_atomically_with_policy`] or `content`.
+pub fn write_atomically_from_callback(
     path: &Path,
     content: &dyn Fn(&mut dyn Write) -> io::Result<()>,
     guard: &ExistingFilePolicy<'_>,
@@ -140,7 +140,7 @@ pub fn atomic_from_callback(
     write_atomically_or_in_place(path, content, guard, token, durability, None, &sync_directory)
 }
 
-/// Like [`atomic_from_callback`], but if `expected` is set, replaces only a file with this content. `sync`
+/// Like [`write_atomically_from_callback`], but if `expected` is set, replaces only a file with this content. `sync`
 /// synchronizes a directory.
 pub(super) fn write_atomically_or_in_place(
     path: &Path,
@@ -186,7 +186,7 @@ pub(super) fn write_atomically_or_in_place(
             };
             if let (Err(error), AttributeLossPolicy::Report(report)) = (synced, &guard.losses) {
                 // The file has been renamed. Only a power failure could undo this.
-                let why = describe_error(&error);
+                let why = describe_io_error(&error);
                 report(WriteWarning::NotSynchronized { path: path.to_owned(), why });
             }
             if let (AttributeLossPolicy::Report(report), false) = (guard.losses, lost.is_empty()) {
@@ -204,7 +204,7 @@ pub(super) fn write_atomically_or_in_place(
     }
 }
 
-/// Makes exceeding `ulimit -f` an error instead of a fatal signal (SIGXFSZ). [`atomic`] calls this function.
+/// Makes exceeding `ulimit -f` an error instead of a fatal signal (SIGXFSZ). [`write_atomically`] calls this function.
 /// Call it once before writing files in other ways.
 pub fn ignore_file_size_signal() {
     static ONCE: Once = Once::new();

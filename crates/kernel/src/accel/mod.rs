@@ -16,7 +16,7 @@ mod triangle_list_tests;
 #[cfg(test)]
 mod watertight_packet_tests;
 
-pub use bvh::{AnyHitCallback, Bvh, ClosestHitCallback, PrimitiveOrEnclosingSubtree, SphericalShell};
+pub use bvh::{AnyHitCallback, Bvh, ClosestHitCallback, PrimitiveOrSubtreeAroundBox, SphericalShell};
 pub use kd_tree::KdTree;
 pub use ray_interval::{NodeBoundsAndDepth, RayBoxInterval};
 pub use wide_bvh::{InstructionSet, SimdKernel, WideBvh};

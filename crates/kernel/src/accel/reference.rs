@@ -201,7 +201,7 @@ impl ClippedPolygon {
     const NOTHING: Self = Self { points: [DVec3::ZERO; 9], count: 0 };
 
     /// Clips a triangle to a box, keeping the parts in the box's faces.
-    pub fn clip_to_box(corners: [Vec3; 3], bounds: &Aabb) -> Self {
+    pub fn clip_triangle_to_box(corners: [Vec3; 3], bounds: &Aabb) -> Self {
         let (least, greatest) =
             (corners[0].min(corners[1]).min(corners[2]), corners[0].max(corners[1]).max(corners[2]));
         let (mut whole, mut other) = (Self::NOTHING, Self::NOTHING);

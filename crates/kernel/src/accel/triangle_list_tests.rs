@@ -3,7 +3,7 @@
 
 use super::{InstructionSet, SimdKernel};
 use crate::geometry::packet::{HitPacket, PACKET_SIZE, RayPacket};
-use crate::geometry::triangle_list::TriangleList;
+use crate::geometry::triangle_list::BruteForceTriangles;
 use crate::geometry::watertight::ShearedRay;
 use crate::geometry::{Ray, ShapeHit};
 use crate::math::Vec3;
@@ -13,7 +13,7 @@ use crate::math::random::signed_number_generator;
 /// Runs closest-hit and any-hit queries. Returns the nearest hits and three masks: undecided closest-hit
 /// rays, rays that hit any triangle other than `except`, and undecided any-hit rays.
 struct TriangleListQueryKernel<'a> {
-    facets: &'a TriangleList,
+    facets: &'a BruteForceTriangles,
     rays: &'a [Ray],
     except: &'a [u32; PACKET_SIZE],
 }
@@ -92,7 +92,7 @@ fn decided_packets_match_single_rays() {
     let mut counts = [[0_u32; 3]; 6];
     for round in 0..6000 {
         let triangles = room(round / 6, &mut next);
-        let Some(facets) = TriangleList::new(triangles.clone()) else { continue };
+        let Some(facets) = BruteForceTriangles::new(triangles.clone()) else { continue };
         let kind = round % 6;
         let any = |next: &mut dyn FnMut() -> f32| (next().abs() * (triangles.len() as f32 - 0.01)) as usize;
         let on = |of: &[Vec3; 3], next: &mut dyn FnMut() -> f32| {
@@ -151,7 +151,7 @@ fn decided_packets_match_single_rays() {
 
 #[test]
 fn nan_rays_are_undecided() {
-    let facets = TriangleList::new(walls(Vec3::splat(-1.0), Vec3::ONE)).expect("a room");
+    let facets = BruteForceTriangles::new(walls(Vec3::splat(-1.0), Vec3::ONE)).expect("a room");
     let bad = [f32::NAN, f32::INFINITY, 0.0, -0.0, 1e38, 1e-40];
     for (a, b) in bad.into_iter().flat_map(|a| bad.map(|b| (a, b))) {
         for ray in [
@@ -175,10 +175,10 @@ fn nan_rays_are_undecided() {
 #[test]
 fn needles_and_large_meshes_are_rejected() {
     let needle = [Vec3::ZERO, Vec3::X, Vec3::new(0.5, 1e-5, 0.0)];
-    assert!(TriangleList::new(vec![needle]).is_none());
+    assert!(BruteForceTriangles::new(vec![needle]).is_none());
     let wall = [Vec3::ZERO, Vec3::X, Vec3::Y];
-    assert!(TriangleList::new(vec![wall; 64]).is_some());
-    assert!(TriangleList::new(vec![wall; 65]).is_none());
-    assert!(TriangleList::new(vec![]).is_none());
-    assert!(TriangleList::new(vec![[Vec3::NAN; 3], wall]).is_none());
+    assert!(BruteForceTriangles::new(vec![wall; 64]).is_some());
+    assert!(BruteForceTriangles::new(vec![wall; 65]).is_none());
+    assert!(BruteForceTriangles::new(vec![]).is_none());
+    assert!(BruteForceTriangles::new(vec![[Vec3::NAN; 3], wall]).is_none());
 }

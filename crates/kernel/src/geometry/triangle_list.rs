@@ -32,7 +32,7 @@ use crate::math::float::UNIT_ROUNDOFF;
 use crate::math::lanes::{Mask, Simd, TRUE, select, select_u32, set_lane};
 use crate::math::{DVec3, Vec3};
 
-/// Maximum number of triangles in a [`TriangleList`].
+/// Maximum number of triangles in a [`BruteForceTriangles`].
 pub const MAX_TRIANGLES: usize = 64;
 
 /// Error of the intersection with a plane, relative to the largest coordinate.
@@ -85,7 +85,7 @@ struct TriangleOrQuad {
 
 /// The triangles of a small scene.
 #[derive(Debug)]
-pub struct TriangleList {
+pub struct BruteForceTriangles {
     facets: Vec<TriangleOrQuad>,
     corners: Vec<[Vec3; 3]>,
     /// Bounding box.
@@ -120,7 +120,7 @@ struct ErrorTerms {
     end: F32x16,
 }
 
-impl TriangleList {
+impl BruteForceTriangles {
     /// Creates a list of triangles. Returns `None` if there are too many, if one is too slender for the error
     /// bounds, or if their coordinates or extent are out of range.
     pub fn new(corners: Vec<[Vec3; 3]>) -> Option<Self> {
@@ -172,7 +172,7 @@ impl TriangleList {
     ) -> u32 {
         let candidates = self.find_nearest_candidate_per_ray(rays, ends, &[NONE; PACKET_SIZE], simd);
         let NearestCandidateTestResults { hit, undecided, hits } =
-            self.test_nearest_candidates(rays, &candidates, (active, ends), simd);
+            self.test_nearest_candidate_per_ray(rays, &candidates, (active, ends), simd);
         select(&hit, &hits.t, &mut found.t);
         select(&hit, &hits.u, &mut found.u);
         select(&hit, &hits.v, &mut found.v);
@@ -199,7 +199,7 @@ impl TriangleList {
             return [0; 2];
         }
         let NearestCandidateTestResults { hit, undecided, .. } =
-            self.test_nearest_candidates(rays, &candidates, (active, ends), simd);
+            self.test_nearest_candidate_per_ray(rays, &candidates, (active, ends), simd);
         [simd.movemask(&hit) & active, undecided]
     }
 
@@ -292,7 +292,7 @@ impl TriangleList {
 
     /// Tests each ray against its nearest candidate.
     #[inline(always)]
-    fn test_nearest_candidates(
+    fn test_nearest_candidate_per_ray(
         &self,
         rays: &RayPacket,
         candidates: &NearestCandidates,

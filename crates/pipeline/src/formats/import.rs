@@ -8,8 +8,8 @@ use super::{FORMATS, ForeignFormat, ForeignReadContext, ImportedScene};
 use crate::assets::AssetError;
 use crate::control::CancelToken;
 use crate::scene::diagnostic::Diagnostic;
-use crate::stages::containers::GltfContainers;
-use crate::system::threads::logical_cpu_pool;
+use crate::stages::containers::OpenAssetFiles;
+use crate::system::threads::start_logical_cpu_pool;
 
 /// Reasons why a file cannot be imported.
 #[derive(Debug)]
@@ -42,8 +42,8 @@ pub fn import_scene(
         let path = path.display();
         return Err(ImportError::File(format!("cannot import {path}: only {list} files are supported")));
     };
-    let pool = logical_cpu_pool().map_err(ImportError::Work)?;
-    let (view, containers) = (ModelViewOptions::default(), GltfContainers::default());
+    let pool = start_logical_cpu_pool().map_err(ImportError::Work)?;
+    let (view, containers) = (ModelViewOptions::default(), OpenAssetFiles::default());
     let context = ForeignReadContext { view, options, containers: &containers, token };
     pool.install(|| convert(path, folder, &context)).map_err(|error| match error {
         ForeignError::Scene { diagnostics, companions: _ } => ImportError::Scene(diagnostics),

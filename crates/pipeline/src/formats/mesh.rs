@@ -8,7 +8,7 @@ use super::foreign::ForeignError;
 use super::frame::{FOV, frame_model};
 use super::model::{
     DEFAULT_SIZE, Lighting, POLISHED_EXPONENT, POLISHED_ROUGHNESS, UsedNames, add_camera_table, add_ground,
-    add_render_settings, add_sky_and_key_light, file_name, model_warning,
+    add_lighting, add_render_settings, file_name, model_warning,
 };
 use super::{ForeignReadContext, ForeignScene};
 use crate::assets::gltf::ModelProjection;
@@ -135,7 +135,7 @@ fn scene_of_mesh(
     let lighting = Lighting::Default { is_polished: loaded.materials.iter().any(material_may_cast_caustics) };
     add_render_settings(&mut document, None, lighting);
     add_camera_table(&mut document, &eye, ModelProjection::Perspective { fov: FOV });
-    add_sky_and_key_light(&mut document, &eye, lighting);
+    add_lighting(&mut document, &eye, lighting);
     let is_colored = !loaded.mesh.colors.is_empty();
     let needs_material = loaded.lacks_materials();
     let name = names.make_unique("model", "model");

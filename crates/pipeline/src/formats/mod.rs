@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 
 use self::foreign::{ForeignError, ForeignOptions};
 use self::model::ModelViewOptions;
-use super::stages::containers::GltfContainers;
+use super::stages::containers::OpenAssetFiles;
 use crate::assets::{Companion, FileHash};
 use crate::control::CancelToken;
 use crate::scene::diagnostic::{Diagnostic, Severity};
@@ -55,13 +55,13 @@ const FORMATS: [ForeignFormat; 6] = [
         extensions: &["pbrt"],
         is_model: false,
         read: pbrt::read_glimt_scene,
-        convert: Some(pbrt::convert),
+        convert: Some(pbrt::import_with_assets),
     },
     ForeignFormat {
         extensions: &["xml"],
         is_model: false,
         read: mitsuba::read,
-        convert: Some(mitsuba::convert),
+        convert: Some(mitsuba::import_with_assets),
     },
 ];
 
@@ -83,11 +83,11 @@ pub(crate) struct ForeignFormat {
     pub(crate) read: ReadFn,
     /// Converts a file to a scene for `glimt import`, with the meshes and images in the named folder. `None`
     /// if the format cannot be imported.
-    convert: Option<ConvertFn>,
+    convert: Option<ImportFn>,
 }
 
 type ReadFn = fn(&Path, &ForeignReadContext<'_>) -> Result<ForeignScene, ForeignError>;
-type ConvertFn = fn(&Path, &str, &ForeignReadContext<'_>) -> Result<ImportedScene, ForeignError>;
+type ImportFn = fn(&Path, &str, &ForeignReadContext<'_>) -> Result<ImportedScene, ForeignError>;
 
 /// Everything an importer needs besides the file.
 #[derive(Clone, Copy)]
@@ -97,7 +97,7 @@ pub(crate) struct ForeignReadContext<'a> {
     /// Options for scenes from other renderers.
     pub(crate) options: &'a ForeignOptions,
     /// Open files. Meshes stored here are not read again when the scene's assets are loaded.
-    pub(crate) containers: &'a GltfContainers,
+    pub(crate) containers: &'a OpenAssetFiles,
     pub(crate) token: &'a CancelToken,
 }
 

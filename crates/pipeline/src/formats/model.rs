@@ -7,7 +7,7 @@ use super::frame::{
     CameraPose, KEY_LIGHT_IRRADIANCE, SKY_RADIANCE, ground_reflectance_matching_sky,
     key_light_travel_direction, round_to_decimals_of_step,
 };
-use super::rounding::{round_significant, shorten, shorten_vector};
+use super::rounding::{round_significant, shorten_number, shorten_vector};
 use crate::assets::gltf::ModelProjection;
 use crate::math::DVec3;
 use crate::scene::SceneDocumentBuilder;
@@ -161,18 +161,18 @@ pub(super) fn add_camera_table(
     }
     match projection {
         ModelProjection::Perspective { fov: 40.0 } => {}
-        ModelProjection::Perspective { fov } => document.set("fov", shorten(fov)),
+        ModelProjection::Perspective { fov } => document.set("fov", shorten_number(fov)),
         ModelProjection::Orthographic { view_height } => {
             document.set("projection", "orthographic");
-            document.set("view_height", shorten(view_height));
+            document.set("view_height", shorten_number(view_height));
         }
     }
 }
 
 /// Adds a sky, plus a key light if the model has no lights.
-pub(super) fn add_sky_and_key_light(document: &mut SceneDocumentBuilder, eye: &CameraPose, light: Lighting) {
+pub(super) fn add_lighting(document: &mut SceneDocumentBuilder, eye: &CameraPose, light: Lighting) {
     document.start_table("environment");
-    document.set("color", shorten(light.uniform_sky_radiance()));
+    document.set("color", shorten_number(light.uniform_sky_radiance()));
     if matches!(light, Lighting::Default { .. }) {
         document.start_list_table("light");
         document.set("type", "directional");
@@ -196,7 +196,7 @@ pub(super) fn add_ground(
     }
     let name = names.make_unique("ground", "ground");
     document.start_named_table("materials", &name);
-    document.set("diffuse", shorten(ground_reflectance_matching_sky()));
+    document.set("diffuse", shorten_number(ground_reflectance_matching_sky()));
     document.start_list_table("plane");
     document.set("point", [0.0, round_to_decimals_of_step(height, size * 1e-5), 0.0]);
     document.set("material", name);

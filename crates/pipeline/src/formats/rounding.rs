@@ -5,7 +5,7 @@ use crate::scene::BuiltValue;
 
 /// Returns the number with the fewest decimal digits that rounds to the same single-precision value. Numbers
 /// from 10,000 to 1e15 in magnitude are returned unchanged.
-pub(super) fn shorten(value: f64) -> f64 {
+pub(super) fn shorten_number(value: f64) -> f64 {
     if (1e4..1e15).contains(&value.abs()) {
         return value;
     }
@@ -14,18 +14,18 @@ pub(super) fn shorten(value: f64) -> f64 {
 
 /// Shortens the components of a vector.
 pub(super) fn shorten_vector(value: DVec3) -> DVec3 {
-    DVec3::from(value.to_array().map(shorten))
+    DVec3::from(value.to_array().map(shorten_number))
 }
 
 /// Shortens the components of a pair.
 pub(super) fn shorten_pair(value: Vec2) -> [f64; 2] {
-    [value.x, value.y].map(|part| shorten(part.into()))
+    [value.x, value.y].map(|part| shorten_number(part.into()))
 }
 
 /// Shortens the components of a color. Grays become a single number.
 pub(super) fn shorten_color(value: DVec3) -> BuiltValue {
     let [red, green, blue] = value.to_array();
-    if red == green && green == blue { shorten(red).into() } else { shorten_vector(value).into() }
+    if red == green && green == blue { shorten_number(red).into() } else { shorten_vector(value).into() }
 }
 
 /// Rounds to `digits` significant digits.
@@ -52,9 +52,9 @@ mod tests {
             (f64::from(3e20_f32), 3e20),
             (1e300, f64::INFINITY),
         ] {
-            assert_eq!(shorten(value), short);
+            assert_eq!(shorten_number(value), short);
         }
-        assert!(shorten(f64::NAN).is_nan());
+        assert!(shorten_number(f64::NAN).is_nan());
         assert_eq!(shorten_color(DVec3::ONE), 1.0.into());
         assert_eq!(
             (round_significant(1234.56, 3), round_significant(-0.012345, 2), round_significant(0.0, 2)),

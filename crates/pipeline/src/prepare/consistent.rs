@@ -7,7 +7,7 @@ use rayon::ThreadPool;
 
 use crate::control::CancelToken;
 use crate::sink::EventSink;
-use crate::stages::containers::GltfContainers;
+use crate::stages::containers::OpenAssetFiles;
 use crate::stages::{AbortReason, FileReadContext, Findings};
 use crate::system::memory::ulimit_or_cgroup_limit;
 use crate::table::StageRecorder;
@@ -46,7 +46,7 @@ impl FileReader<'_> {
     ) -> Result<T, AbortReason> {
         for _ in 0..MAX_READS {
             let contents = FilesSeenByRequest::new(Arc::clone(self.contents));
-            let containers = GltfContainers::default();
+            let containers = OpenAssetFiles::default();
             let files = self.file_read_context(&contents, &containers);
             let result = read(&mut SceneReadAttempt { files, table, findings });
             if result.is_err() && !self.token.is_canceled() {
@@ -72,7 +72,7 @@ impl FileReader<'_> {
         read: impl FnOnce(&FileReadContext<'_>) -> Result<T, AbortReason>,
     ) -> Result<Option<T>, AbortReason> {
         let contents = FilesSeenByRequest::new(Arc::clone(self.contents));
-        let result = read(&self.file_read_context(&contents, &GltfContainers::default()))?;
+        let result = read(&self.file_read_context(&contents, &OpenAssetFiles::default()))?;
         contents.record_changes_to_seen_files(self.token)?;
         Ok(Some(result).filter(|_| contents.changed_file().is_none()))
     }
@@ -80,7 +80,7 @@ impl FileReader<'_> {
     fn file_read_context<'a>(
         &'a self,
         contents: &'a FilesSeenByRequest,
-        containers: &'a GltfContainers,
+        containers: &'a OpenAssetFiles,
     ) -> FileReadContext<'a> {
         let FileReader { sink, token, pool, .. } = *self;
         let available_memory = ulimit_or_cgroup_limit().map_or(u64::MAX, |limit| limit.bytes);

@@ -24,7 +24,7 @@ use crate::stages::coplanar::warn_about_coplanar_lights;
 use crate::stages::glass::find_glass_solids;
 use crate::stages::lights::LightCache;
 use crate::stages::meshes::{CachedMesh, MeshPathAndOptions, load_meshes};
-use crate::stages::parse::{ParsedScene, SceneParseRequest, parse};
+use crate::stages::parse::{ParsedScene, SceneParseRequest, parse_or_reuse_scene};
 use crate::stages::textures::{TextureCache, TextureSelection, find_needed_textures, load_textures};
 use crate::stages::{AbortReason, FileReadContext, Findings};
 use crate::world::{CoplanarLight, GlassSolids, TextureRolesNeededByRender, World};
@@ -60,7 +60,7 @@ impl SceneCache {
         let SceneReadAttempt { files, table, findings } = reading;
         let stage = table.start(Stage::Parse);
         // Reading a model uses all threads.
-        let parsed = files.pool.install(|| parse(scene, &mut self.parsed, findings, files))?;
+        let parsed = files.pool.install(|| parse_or_reuse_scene(scene, &mut self.parsed, findings, files))?;
         Ok(stage.finish(parsed))
     }
 

@@ -53,7 +53,7 @@ impl Stage {
 /// Status of a stage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Status {
+pub enum StageStatus {
     /// In progress. Never used in a finished report.
     Running,
     /// Run by this request.
@@ -70,7 +70,7 @@ pub struct StageReport {
     /// The stage.
     pub name: Stage,
     /// Status of the stage.
-    pub status: Status,
+    pub status: StageStatus,
     /// Wall-clock time of the stage.
     pub seconds: f64,
     /// CPU time used by all threads of the process during the stage.

@@ -113,7 +113,7 @@ impl<'a> CoarseImageRenderer<'a> {
             return Ok(());
         };
         let picture = self.trace_coarse_image(None, width, height, tick)?;
-        screen.show_without_photons(&picture.resized(shown_width, shown_height));
+        screen.send_without_photons(&picture.resized(shown_width, shown_height));
         Ok(())
     }
 }

@@ -4,7 +4,7 @@ use std::cell::{Cell, RefCell};
 
 use super::checkpointer::Interruption;
 use super::film_state::FilmState;
-use crate::protocol::{Event, MaxPreviewSize};
+use crate::protocol::{Event, PreviewBounds};
 use crate::queries::{QueryContext, QueryOrEdit};
 use crate::report::finish::remove_outdated_report;
 use crate::stages::write::{ImageWriteContext, WriteState, write_on_request};
@@ -20,7 +20,7 @@ pub(crate) trait PendingCommands {
         false
     }
     /// Takes the pending preview size change.
-    fn take_preview_resize(&self) -> Option<Option<MaxPreviewSize>> {
+    fn take_preview_resize(&self) -> Option<Option<PreviewBounds>> {
         None
     }
     /// Takes the next query about the current image.

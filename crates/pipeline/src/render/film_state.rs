@@ -141,7 +141,7 @@ impl FilmState {
 
     /// Maps this share's samples to sample indices in the whole image. If the indices are not all
     /// consecutive, returns only the first consecutive range.
-    pub(crate) fn to_first_global_sample_range(&self, samples: Range<u32>) -> Range<u32> {
+    pub(crate) fn to_consecutive_global_range(&self, samples: Range<u32>) -> Range<u32> {
         match &self.share {
             Some(share) => share.to_global_sample_range(samples),
             None => samples,

@@ -70,14 +70,14 @@ impl CellSampleGoals {
         samples: u32,
         error: f64,
     ) -> Option<NoiseMeasurements> {
-        let is_time = samples >= MIN_SAMPLES && !self.needs_min_samples(done);
+        let is_time = samples >= MIN_SAMPLES && !self.any_half_below_min_samples(done);
         if is_time && self.brightness.is_none() {
             self.brightness = BrightnessPrepassPixels::new(film.crop_rect()).film_mean_luminance(film);
         }
         let brightness = self.brightness.or_else(|| film.mean_luminance())?;
         let aim = NoiseTarget { error, brightness, convergence: film.convergence_model() };
         let is_open =
-            |tile: usize| self.judged[tile] < samples && self.tile_has_undecided_half_at(tile, done, samples);
+            |tile: usize| self.judged[tile] < samples && self.tile_has_undecided_goal_at(tile, done, samples);
         let noise = film.map_tiles(|tile| is_open(tile).then(|| TileNoise::measure(film, tile)));
         if is_time {
             self.decide_goals_within_next_doubling(&noise, done, samples, &aim);
@@ -108,7 +108,7 @@ impl CellSampleGoals {
     }
 
     /// Whether a tile contains an undecided half with `samples` samples.
-    pub(crate) fn tile_has_undecided_half_at(&self, tile: usize, done: &[[u32; 2]], samples: u32) -> bool {
+    pub(crate) fn tile_has_undecided_goal_at(&self, tile: usize, done: &[[u32; 2]], samples: u32) -> bool {
         let cells = self.decided.iter().zip(done).skip(CELLS * tile).take(CELLS);
         cells
             .flat_map(|(goals, done)| goals.iter().zip(done))
@@ -116,7 +116,7 @@ impl CellSampleGoals {
     }
 
     /// Whether any half that needs more samples has fewer than [`MIN_SAMPLES`].
-    fn needs_min_samples(&self, done: &[[u32; 2]]) -> bool {
+    fn any_half_below_min_samples(&self, done: &[[u32; 2]]) -> bool {
         let mut halves = self.decided.as_flattened().iter().zip(done.as_flattened());
         halves.any(|(goal, done)| goal > done && *done < MIN_SAMPLES)
     }
@@ -225,7 +225,7 @@ pub(crate) mod tests {
     use crate::math::random::unit_generator;
 
     /// Creates a one-tile film. `halves` contains the mean and spread of each half's samples.
-    pub(crate) fn film(halves: [(f32, f32); 2], samples: u32) -> Film {
+    pub(crate) fn one_tile_film(halves: [(f32, f32); 2], samples: u32) -> Film {
         const COLUMNS: u32 = 32;
         let film = Film::new(COLUMNS, 2, None).expect("a film");
         let mut next = unit_generator(3);
@@ -243,7 +243,7 @@ pub(crate) mod tests {
 
     fn decided_goals(halves: [(f32, f32); 2], samples: u32, error: f64) -> CellSampleGoals {
         let mut goals = CellSampleGoals::new_undecided(1);
-        goals.decide_tile_sample_goals(&film(halves, samples), &[[samples; 2]], samples, error);
+        goals.decide_tile_sample_goals(&one_tile_film(halves, samples), &[[samples; 2]], samples, error);
         goals
     }
 
@@ -257,7 +257,7 @@ pub(crate) mod tests {
 
     #[test]
     fn tiles_noisy_after_merging_halves_are_counted() {
-        let rough = film([(1.0, 0.0), (1.0, 1.0)], 16);
+        let rough = one_tile_film([(1.0, 0.0), (1.0, 1.0)], 16);
         let goals = decided_goals([(1.0, 0.0), (1.0, 1.0)], 16, 0.01);
         assert_eq!(
             goals.count_finished_tiles_above_target(&rough, 0.01),
@@ -265,7 +265,7 @@ pub(crate) mod tests {
             "the first half should continue"
         );
         let clean = decided_goals([(1.0, 0.0); 2], 16, 0.01);
-        assert_eq!(clean.count_finished_tiles_above_target(&film([(1.0, 0.0); 2], 16), 0.01), None);
+        assert_eq!(clean.count_finished_tiles_above_target(&one_tile_film([(1.0, 0.0); 2], 16), 0.01), None);
         // One of the two halves has a standard error of √(1/12/16).
         let Some((tiles, worst)) = clean.count_finished_tiles_above_target(&rough, 0.01) else {
             panic!("one tile should be reported")

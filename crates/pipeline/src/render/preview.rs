@@ -11,7 +11,7 @@ use crate::film::tone::{ToneMapping, tone_map_to_8_bits};
 use crate::film::{FilmQuantity, Previewer, RadianceImage, Rect};
 use crate::keys;
 use crate::plan::RenderPlan;
-use crate::protocol::{MaxPreviewSize, NormalizedPosition, NormalizedRect, PreviewedImageState};
+use crate::protocol::{NormalizedPosition, NormalizedRect, PreviewBounds, PreviewedImageState};
 use crate::sink::EventSink;
 
 /// Maximum time spent on updating a preview before checking for commands.
@@ -21,7 +21,7 @@ const UPDATE_TIME_LIMIT: Duration = Duration::from_millis(4);
 #[derive(Clone, Copy)]
 pub(crate) struct PreviewSender<'a> {
     /// Maximum size of previews. `None` disables previews.
-    pub(crate) bounds: Option<MaxPreviewSize>,
+    pub(crate) bounds: Option<PreviewBounds>,
     pub(crate) plan: &'a RenderPlan,
     pub(crate) sink: &'a EventSink,
 }
@@ -88,7 +88,7 @@ impl PreviewSender<'_> {
     }
 
     /// Sends a radiance image that lacks light from photons.
-    pub(crate) fn show_without_photons(&self, image: &RadianceImage) {
+    pub(crate) fn send_without_photons(&self, image: &RadianceImage) {
         self.sink.send_preview_without_photons(tone_map_to_8_bits(
             image,
             &self.plan.tone_mapping().with_image_range(image),
@@ -128,7 +128,7 @@ impl PreviewSender<'_> {
     /// Returns the pixels of the 1:1 section, if one was requested.
     fn requested_section(&self) -> Option<Rect> {
         let render = &self.plan.settings.render;
-        let MaxPreviewSize { width, height, around } = self.bounds?;
+        let PreviewBounds { width, height, around } = self.bounds?;
         let NormalizedPosition { x, y } = around?;
         let along = |middle: f64, length: u32, side: u32| {
             let length = length.min(side);
@@ -149,7 +149,7 @@ fn update_previewer_briefly(state: &mut FilmState, quantity: FilmQuantity, width
 }
 
 /// Returns the largest size that fits into the bounds and keeps the aspect ratio.
-fn fit_size(width: u32, height: u32, bounds: MaxPreviewSize) -> Option<(u32, u32)> {
+fn fit_size(width: u32, height: u32, bounds: PreviewBounds) -> Option<(u32, u32)> {
     if bounds.width == 0 || bounds.height == 0 {
         return None;
     }
@@ -170,7 +170,7 @@ mod tests {
 
     #[test]
     fn preview_keeps_the_aspect_ratio() {
-        let bounds = |width, height| MaxPreviewSize { width, height, around: None };
+        let bounds = |width, height| PreviewBounds { width, height, around: None };
         assert_eq!(fit_size(640, 480, bounds(80, 48)), Some((64, 48)));
         assert_eq!(fit_size(640, 480, bounds(64, 100)), Some((64, 48)));
         assert_eq!(fit_size(10_000, 1, bounds(80, 48)), Some((80, 1)));

@@ -166,7 +166,7 @@ impl<'s, 'a> Scheduler<'s, 'a> {
         }
         let RenderOptions { samples, error, .. } = self.rendering.plan.settings.render;
         if error > 0.0 && samples >= MIN_SAMPLES && self.state.share.is_some() {
-            self.estimate_reference_brightness()?;
+            self.estimate_brightness_for_noise()?;
         }
         if let Some(first) = self.priority_rect() {
             // Noise is relative to the brightness of the whole image, so sample the whole image first.
@@ -187,7 +187,7 @@ impl<'s, 'a> Scheduler<'s, 'a> {
     }
 
     /// Renders a prepass over the whole image, even if this process renders only a share of it.
-    fn estimate_reference_brightness(&mut self) -> Result<(), AbortReason> {
+    fn estimate_brightness_for_noise(&mut self) -> Result<(), AbortReason> {
         if self.state.goals.brightness.is_some() {
             return Ok(());
         }
@@ -266,7 +266,7 @@ impl<'s, 'a> Scheduler<'s, 'a> {
         while !self.state.is_complete_in_region(part, target) && !self.is_over_time {
             let samples = self.state.min_unfinished_samples_in(part, target);
             let at_once = samples..target.min(samples.saturating_add(photons.max_passes_at_once()));
-            let numbers = self.state.to_first_global_sample_range(at_once);
+            let numbers = self.state.to_consecutive_global_range(at_once);
             let end = samples + numbers.len() as u32;
             // Do not trace or gather photons if there is no time left.
             self.run_due_tasks();

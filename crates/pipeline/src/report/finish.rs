@@ -7,7 +7,7 @@ use crate::control::CancelToken;
 use crate::film::range_map::DataBrightnessMap;
 use crate::inputs::ProtectedInputs;
 use crate::integrators::{RayCounters, light_sampling_purpose};
-use crate::output::write::{ExistingFilePolicy, atomic_with_policy};
+use crate::output::write::{ExistingFilePolicy, write_atomically_with_policy};
 use crate::output::{OutputError, json};
 use crate::plan::RenderPlan;
 use crate::prepare::ReadyScene;
@@ -65,7 +65,7 @@ pub(crate) fn write_report(
         |error: serde_json::Error| OutputError::File { path: path.clone(), source: error.into() };
     let text = json::to_pretty_text(report).map_err(unwritable)?;
     write_guarded(plan, inputs, OutputTarget::from_report_path(path), None, sink, |guard| {
-        atomic_with_policy(path, text.as_bytes(), guard, token)
+        write_atomically_with_policy(path, text.as_bytes(), guard, token)
     })
 }
 

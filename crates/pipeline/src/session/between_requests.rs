@@ -3,7 +3,7 @@
 use super::{CurrentImage, Session};
 use crate::control::CancelToken;
 use crate::messages::{INCOMPLETE_IMAGE, NEWEST_IMAGE_NOT_WRITTEN, NO_IMAGE, SCENE_HAS_ERRORS};
-use crate::protocol::{ImageReport, MaxPreviewSize, Report};
+use crate::protocol::{ImageReport, PreviewBounds, Report};
 use crate::queries::QueryOrEdit;
 use crate::render::checkpointer::Interruption;
 use crate::render::film_state::FilmState;
@@ -21,7 +21,7 @@ impl Session {
     /// Sends a preview of the current image at another size.
     pub(crate) fn send_resized_preview(
         &mut self,
-        bounds: Option<MaxPreviewSize>,
+        bounds: Option<PreviewBounds>,
         sink: &EventSink,
         token: &CancelToken,
     ) {
@@ -100,7 +100,7 @@ impl Session {
     }
 
     /// Saves a checkpoint of the scene's own image if the worker stops while showing another image.
-    pub(crate) fn checkpoint_own_image(&self, sink: &EventSink, interruption: Interruption) {
+    pub(crate) fn save_scene_image_checkpoint(&self, sink: &EventSink, interruption: Interruption) {
         let own = self.own.current.as_ref().filter(|_| !self.is_scene_image_written());
         let Some(state) = own.and_then(|own| self.films.get(own.film)).filter(|state| !state.is_kept) else {
             return;

@@ -17,7 +17,7 @@ use crate::watch::content::FilePathAndContentId;
 
 /// The scene's files: which to watch, which not to write, and the last valid scene that was read from them.
 #[derive(Default)]
-pub(super) struct SceneFiles {
+pub(super) struct SceneFileTracker {
     /// Files of the last loaded scene, which are watched while the scene file is broken.
     loaded: Vec<FilePathAndContentId>,
     /// All files that must not be written: the files of the last valid scene and all files referenced since.
@@ -27,7 +27,7 @@ pub(super) struct SceneFiles {
     pub(super) last_valid: Option<Arc<SceneAssets>>,
 }
 
-impl SceneFiles {
+impl SceneFileTracker {
     /// Protects the files that a parsed scene references, and returns the output files that conflict with
     /// them. The previous scene's files remain protected, because its image is still shown and may have to be
     /// written.

@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use super::{RequestContext, Session};
 use crate::memory::MemoryEstimate;
-use crate::plan::RequestPlans;
+use crate::plan::ShownAndScenePlans;
 use crate::prepare::FileReader;
-use crate::protocol::{Event, LastValidSceneRenderOutcome, Request, Status};
+use crate::protocol::{Event, LastValidSceneRenderOutcome, Request, StageStatus};
 use crate::report::finish::remove_outdated_report;
 use crate::stages::{AbortReason, Findings};
 use crate::table::StageRecorder;
@@ -43,7 +43,7 @@ impl Session {
             return Ok(None);
         };
         // Load the textures needed for another view if their files are still valid.
-        let plans = RequestPlans::resolve(&last.parsed.loaded.scene, request)?;
+        let plans = ShownAndScenePlans::resolve(&last.parsed.loaded.scene, request)?;
         let pool = self.threads.get_or_create_pool(plans.shown.limits.threads, true)?;
         let reader = FileReader { contents: &self.contents, pool: &pool, sink, token };
         let roles = plans.texture_needs();
@@ -53,7 +53,7 @@ impl Session {
         let Some(assets) = assets.flatten() else { return Ok(None) };
         *last = Arc::clone(&assets);
         let estimate = MemoryEstimate::for_image_and_scene(&plans.shown, &assets);
-        self.check_memory(&estimate, request, &plans)?;
+        self.check_memory_and_limit_films(&estimate, request, &plans)?;
         // Prepare the scene, reusing unchanged values, and render it.
         let mut table = StageRecorder::new(None, token);
         let scene = self.build_world(request, assets, plans, &mut table, &pool)?;
@@ -66,11 +66,11 @@ impl Session {
         let is_written_now = !is_kept
             && self
                 .run_write_stage(context, plan, &Findings::default(), &pool)
-                .is_ok_and(|staged| staged.status == Status::Done);
+                .is_ok_and(|staged| staged.status == StageStatus::Done);
         if is_written_now {
             // Remove the existing report, because it does not describe this image.
             remove_outdated_report(plan, &self.files.protected, sink);
         }
-        Ok(Some(rendered.status == Status::Reused && !is_written_now))
+        Ok(Some(rendered.status == StageStatus::Reused && !is_written_now))
     }
 }

@@ -23,8 +23,8 @@ use std::cell::Cell;
 use std::path::Path;
 use std::sync::Arc;
 
-use self::files::SceneFiles;
-use self::own_image::OwnImage;
+use self::files::SceneFileTracker;
+use self::own_image::SceneImage;
 pub(super) use self::request::CompletedRequest;
 use crate::control::CancelToken;
 use crate::plan::RenderPlan;
@@ -77,12 +77,12 @@ pub(super) struct Session {
     contents: Arc<FileHashCache>,
     threads: RenderThreads,
     scenes: SceneCache,
-    files: SceneFiles,
+    files: SceneFileTracker,
     photons: PhotonCache,
     films: FilmCache,
     /// The image of the current film, or `None` before the first image.
     current: Option<CurrentImage>,
-    own: OwnImage,
+    own: SceneImage,
     written: WriteState,
     /// Speed at which the most recent first image was rendered, in pixels per second.
     coarse_rate: Cell<Option<f64>>,

@@ -2,7 +2,7 @@
 
 use rayon::ThreadPool;
 
-use super::render::RequestImage;
+use super::render::RequestImageInputs;
 use super::{RequestContext, Session};
 use crate::control::CancelToken;
 use crate::output::OutputError;
@@ -25,10 +25,10 @@ pub(super) struct WriteOutcome {
 
 impl Session {
     /// Writes the image of a request, and removes or saves the checkpoint of the scene's own image.
-    pub(super) fn write_image(
+    pub(super) fn write_image_and_checkpoint(
         &mut self,
         context: &RequestContext<'_>,
-        image: &RequestImage,
+        image: &RequestImageInputs,
         table: &mut StageRecorder<'_>,
         findings: &mut Findings,
         pool: &ThreadPool,
@@ -47,7 +47,7 @@ impl Session {
     }
 
     /// Reports the state of the scene's own image while another image is shown.
-    pub(super) fn report_scene_image_state(&self, context: &RequestContext<'_>, image: &RequestImage) {
+    pub(super) fn report_scene_image_state(&self, context: &RequestContext<'_>, image: &RequestImageInputs) {
         let Some(own) = self.own.current.as_ref().filter(|_| context.request.own.is_some()) else { return };
         let state = match self.films.get(own.film) {
             _ if self.is_scene_image_written() => SavedSceneRenderStatus::Written,
@@ -77,7 +77,7 @@ impl Session {
             return Ok(StageResult::skipped(false, conflict.message.clone()));
         }
         if request.own.is_some() {
-            self.write_own_image_if_film_is_shared(context, pool)?;
+            self.write_scene_image_of_same_film(context, pool)?;
             return Ok(StageResult::skipped(false, reasons::PREVIEW_ONLY));
         }
         if self.written.has_user_written_image_on_disk(&self.contents) {
@@ -100,7 +100,7 @@ impl Session {
     ///
     /// # Errors
     /// Returns [`AbortReason::Canceled`] if writing is canceled.
-    fn write_own_image_if_film_is_shared(
+    fn write_scene_image_of_same_film(
         &mut self,
         context: &RequestContext<'_>,
         pool: &ThreadPool,
@@ -124,7 +124,7 @@ impl Session {
     }
 
     /// Removes or saves the checkpoint of the scene's own image after the write stage.
-    fn finish_checkpoint(&self, context: &RequestContext<'_>, image: &RequestImage, is_written: bool) {
+    fn finish_checkpoint(&self, context: &RequestContext<'_>, image: &RequestImageInputs, is_written: bool) {
         let Some(state) = self.films.current().filter(|_| context.request.should_write_scene_image()) else {
             return;
         };

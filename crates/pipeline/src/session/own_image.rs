@@ -69,7 +69,7 @@ fn image_with_outputs_key(film: Fingerprint, plan: &RenderPlan) -> Fingerprint {
 
 /// The scene's own image across requests.
 #[derive(Default)]
-pub(super) struct OwnImage {
+pub(super) struct SceneImage {
     /// The image for the newest request with a valid scene.
     pub(super) current: Option<SavedSceneImageInputs>,
     /// Whether the film may be dropped while other images are rendered.
@@ -78,10 +78,10 @@ pub(super) struct OwnImage {
     checkpoint_lock: RefCell<ProcessCheckpointState>,
 }
 
-impl OwnImage {
+impl SceneImage {
     /// Sets the image for a request and keeps its film while other images are rendered. See
     /// [`SavedSceneImageInputs::new`].
-    pub(super) fn set(
+    pub(super) fn set_for_request(
         &mut self,
         scene: &ReadyScene,
         plan: RenderPlan,

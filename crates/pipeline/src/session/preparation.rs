@@ -9,7 +9,7 @@ use crate::formats::model::ModelViewOptions;
 use crate::inputs::ProtectedInputs;
 use crate::keys;
 use crate::memory::MemoryEstimate;
-use crate::plan::{RenderPlan, RequestPlans};
+use crate::plan::{RenderPlan, ShownAndScenePlans};
 use crate::prepare::{FileReader, ReadyScene, RequestCamera, SceneAssets, SceneReadAttempt};
 use crate::protocol::{Event, Request};
 use crate::render::film_state::FilmState;
@@ -26,7 +26,7 @@ use crate::warnings::settings_warnings;
 
 impl Session {
     /// Reads one consistent version of the request's scene and builds its world.
-    pub(super) fn prepare(
+    pub(super) fn prepare_scene(
         &mut self,
         context: &RequestContext<'_>,
         pool: &ThreadPool,
@@ -50,20 +50,20 @@ impl Session {
         &mut self,
         request: &Request,
         reading: &mut SceneReadAttempt<'_, '_>,
-    ) -> Result<(SceneAssets, RequestPlans), AbortReason> {
+    ) -> Result<(SceneAssets, ShownAndScenePlans), AbortReason> {
         let (Request { overrides, write, .. }, sink) = (request, reading.files.sink);
         let show = ModelViewOptions::from_overrides(overrides);
         let foreign = &overrides.foreign;
         let scene = SceneParseRequest { path: &request.scene, sets: &overrides.sets, show, foreign };
         let parsed = self.scenes.parse_scene(scene, reading)?;
         if !parsed.loaded.is_foreign() {
-            let text = parsed.loaded.source.file_text_as_arc();
+            let text = parsed.loaded.source.text_without_set_args_as_arc();
             sink.send(Event::Text { generation: request.generation, text });
         }
-        let plans = RequestPlans::resolve(&parsed.loaded.scene, request)?;
+        let plans = ShownAndScenePlans::resolve(&parsed.loaded.scene, request)?;
         let plan = &plans.shown;
         reading.files.available_memory =
-            self.check_memory(&MemoryEstimate::for_image(plan), request, &plans)?;
+            self.check_memory_and_limit_films(&MemoryEstimate::for_image(plan), request, &plans)?;
         let findings = &mut *reading.findings;
         findings.warnings.extend(settings_warnings(&parsed.loaded, &plan.scene, &plan.settings, overrides));
         send_settings(&parsed, plan, sink);
@@ -83,7 +83,11 @@ impl Session {
             reading.files.contents.wait_for_writers(reading.files.token)?;
         }
         reading.verify_files_unchanged()?;
-        self.check_memory(&MemoryEstimate::for_image_and_scene(plan, &assets), request, &plans)?;
+        self.check_memory_and_limit_films(
+            &MemoryEstimate::for_image_and_scene(plan, &assets),
+            request,
+            &plans,
+        )?;
         self.files.protected = ProtectedInputs::from_assets(&assets);
         reading.findings.record_output_conflicts(
             output_conflicts(plan, &self.files.protected),
@@ -100,11 +104,11 @@ impl Session {
     ///
     /// # Errors
     /// The request needs more memory than is available.
-    pub(super) fn check_memory(
+    pub(super) fn check_memory_and_limit_films(
         &mut self,
         estimate: &MemoryEstimate,
         request: &Request,
-        plans: &RequestPlans,
+        plans: &ShownAndScenePlans,
     ) -> Result<u64, AbortReason> {
         let bytes = self.separate_own_film_bytes(request, plans);
         let all = estimate.clone().with_saved_scene_film(bytes).check(&plans.shown);
@@ -119,11 +123,11 @@ impl Session {
     }
 
     /// Returns the size of the own image's film in bytes if it is kept in addition to the request's film.
-    fn separate_own_film_bytes(&self, request: &Request, plans: &RequestPlans) -> u64 {
+    fn separate_own_film_bytes(&self, request: &Request, plans: &ShownAndScenePlans) -> u64 {
         let (Some(own), Some(own_plan)) = (&self.own.current, &plans.own) else { return 0 };
         let of = |plan: &RenderPlan| keys::film_sums_key(own.film, &plan.settings, plan.crop);
         let is_shared = of(&plans.shown) == of(own_plan)
-            && request.overrides.camera == request.saved_scene_overrides().camera;
+            && request.overrides.camera == request.scene_image_overrides().camera;
         let state = self.films.get(own.film).filter(|state| state.has_samples() && !is_shared);
         state.map_or(0, FilmState::memory_bytes)
     }
@@ -133,14 +137,14 @@ impl Session {
         &mut self,
         request: &Request,
         assets: Arc<SceneAssets>,
-        plans: RequestPlans,
+        plans: ShownAndScenePlans,
         table: &mut StageRecorder<'_>,
         pool: &ThreadPool,
     ) -> Result<ReadyScene, AbortReason> {
-        let RequestPlans { shown, own } = plans;
+        let ShownAndScenePlans { shown, own } = plans;
         let ready = self.scenes.build_ready_scene(assets, shown, &request.overrides.camera, table, pool)?;
         let own = own.unwrap_or_else(|| ready.plan.clone());
-        self.own.set(&ready, own, request.saved_scene_overrides().camera, &mut self.films);
+        self.own.set_for_request(&ready, own, request.scene_image_overrides().camera, &mut self.films);
         Ok(ready)
     }
 }

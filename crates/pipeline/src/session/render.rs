@@ -9,7 +9,7 @@ use crate::control::CancelToken;
 use crate::integrators::RayCounters;
 use crate::keys;
 use crate::prepare::ReadyScene;
-use crate::protocol::{Request, Stage, Status};
+use crate::protocol::{Request, Stage, StageStatus};
 use crate::queries::QueryContext;
 use crate::render::coarse_image::CoarseImageRenderer;
 use crate::render::commands::PendingCommandRunner;
@@ -26,7 +26,7 @@ use crate::table::StageRecorder;
 use crate::trace::{TileKernel, Tracer};
 
 /// The image of a request.
-pub(super) struct RequestImage {
+pub(super) struct RequestImageInputs {
     pub(super) scene: ReadyScene,
     /// Key of the film.
     pub(super) film: Fingerprint,
@@ -44,7 +44,7 @@ impl Session {
         scene: ReadyScene,
         table: &mut StageRecorder<'_>,
         pool: &ThreadPool,
-    ) -> Result<RequestImage, AbortReason> {
+    ) -> Result<RequestImageInputs, AbortReason> {
         let RequestContext { request, sink, token, .. } = *context;
         let plan = &scene.plan;
         let film = keys::film_sums_key(scene.world_key, &plan.settings, plan.crop);
@@ -77,11 +77,11 @@ impl Session {
         let photons = stage.finish(trace_first_photons(task, photons, sending, tick)?);
         let plan = plan.clone();
         self.current = Some(CurrentImage { plan, queries, is_own, report: None });
-        Ok(RequestImage { scene, film, photons, share: None })
+        Ok(RequestImageInputs { scene, film, photons, share: None })
     }
 
     /// Determines which share of the image this process renders.
-    pub(super) fn assign_share(&mut self, context: &RequestContext<'_>, image: &mut RequestImage) {
+    pub(super) fn assign_share(&mut self, context: &RequestContext<'_>, image: &mut RequestImageInputs) {
         let photons = image.photons.and_then(|key| self.photons.get(key));
         let emits_photons = photons.is_some_and(PhotonStore::has_lit_caustic_casters);
         let plan = &mut image.scene.plan;
@@ -100,7 +100,7 @@ impl Session {
     pub(super) fn render(
         &mut self,
         context: &RequestContext<'_>,
-        image: &RequestImage,
+        image: &RequestImageInputs,
         pool: &ThreadPool,
     ) -> Result<StageResult<RayCounters>, AbortReason> {
         let RequestContext { request, sink, token, .. } = *context;
@@ -141,7 +141,7 @@ impl Session {
             checkpointer: checkpointer.as_ref(),
         };
         let rendered = render(&mut self.films, &rendering);
-        let is_reused = rendered.as_ref().is_ok_and(|staged| staged.status == Status::Reused);
+        let is_reused = rendered.as_ref().is_ok_and(|staged| staged.status == StageStatus::Reused);
         if let Some(state) = self.films.current_mut() {
             if image.share.is_some() {
                 let own = self.own.current.as_ref();

@@ -2,7 +2,7 @@
 
 use super::{RequestContext, Session};
 use crate::plan::thread_count;
-use crate::protocol::{Event, Failure, Report, Stage, Status};
+use crate::protocol::{Event, Failure, Report, Stage, StageStatus};
 use crate::render::film_cache::FilmCache;
 use crate::report::finish::{RequestResults, make_report};
 use crate::scene::diagnostic::Diagnostic;
@@ -65,7 +65,7 @@ impl Session {
         }
         self.files.record_request_outcome(&outcome, &findings, sink);
         let report = outcome?;
-        let settled = |stage: Stage| report.stages[stage as usize].status != Status::Done;
+        let settled = |stage: Stage| report.stages[stage as usize].status != StageStatus::Done;
         let unchanged =
             self.current_image_key_and_view() == before && settled(Stage::Render) && settled(Stage::Write);
         let Findings { conflicts, warnings, .. } = findings;
@@ -87,7 +87,7 @@ impl Session {
         }
         // Prepare the scene, from its files to the world.
         let pool = self.threads.get_or_create_pool(thread_count(&request.overrides), true)?;
-        let scene = self.prepare(context, &pool, &mut table, findings);
+        let scene = self.prepare_scene(context, &pool, &mut table, findings);
         // Even if the render is stopped, keep the files for later requests.
         self.scenes.end_request(scene.is_ok());
         // Trace photons and render the film.
@@ -97,7 +97,7 @@ impl Session {
         let stage = table.start(Stage::Render);
         let rays = stage.finish(self.render(context, &image, &pool)?);
         // Write the image.
-        let wrote = self.write_image(context, &image, &mut table, findings, &pool)?;
+        let wrote = self.write_image_and_checkpoint(context, &image, &mut table, findings, &pool)?;
         // Report the results.
         let results = RequestResults {
             scene: &image.scene,

@@ -20,7 +20,7 @@ use crate::world::{
 };
 
 /// The key of a mesh whose coincident emitters have been separated, and the mesh.
-type KeyedMeshWithSeparateEmitters = (Fingerprint, Arc<LoadedMesh>);
+type KeyedMeshWithDistinctEmitters = (Fingerprint, Arc<LoadedMesh>);
 
 /// Cache of the accel stage.
 #[derive(Debug, Default)]
@@ -64,7 +64,7 @@ pub(crate) fn build_accel_structures(
     pool: &ThreadPool,
     token: &CancelToken,
 ) -> Result<StageResult<AccelResult>, AbortReason> {
-    let distinct = separate_coincident_mesh_emitters(scene, meshes, cache, token)?;
+    let distinct = make_mesh_emitters_distinct(scene, meshes, cache, token)?;
     let (meshes, kept) = build_mesh_trees(scene, meshes, &distinct, cache, pool, token)?;
     let lights_key = keys::key_with_coordinate_origin(&keys::coplanar_lights_key(scene, of), origin);
     let lifts = cache.lifts.get(lights_key).cloned().unwrap_or_else(|| light_lifts(scene, &meshes, origin));
@@ -93,12 +93,12 @@ pub(crate) fn build_accel_structures(
 }
 
 /// Returns the meshes with separated emitters, or `None` for meshes that can be used as they are.
-fn separate_coincident_mesh_emitters(
+fn make_mesh_emitters_distinct(
     scene: &Scene,
     meshes: &MeshesByFileIndex,
     cache: &mut AccelCache,
     token: &CancelToken,
-) -> Result<Vec<Option<KeyedMeshWithSeparateEmitters>>, AbortReason> {
+) -> Result<Vec<Option<KeyedMeshWithDistinctEmitters>>, AbortReason> {
     let distinct = |(mesh, is_emissive): (&Arc<CachedMesh>, bool)| {
         let key = keys::separated_emitters_mesh_key(&mesh.key, is_emissive);
         let found = match cache.distinct.get(&key, key) {
@@ -120,7 +120,7 @@ fn separate_coincident_mesh_emitters(
 fn build_mesh_trees(
     scene: &Scene,
     meshes: &MeshesByFileIndex,
-    distinct: &[Option<KeyedMeshWithSeparateEmitters>],
+    distinct: &[Option<KeyedMeshWithDistinctEmitters>],
     cache: &mut AccelCache,
     pool: &ThreadPool,
     token: &CancelToken,

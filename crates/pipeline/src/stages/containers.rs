@@ -15,7 +15,7 @@ type GltfFileSlot = Arc<Mutex<Option<Arc<GltfFile>>>>;
 
 /// Open glTF files and preloaded meshes.
 #[derive(Debug, Default)]
-pub(crate) struct GltfContainers {
+pub(crate) struct OpenAssetFiles {
     gltf: Mutex<HashMap<PathBuf, GltfFileSlot>>,
     /// Meshes loaded before the meshes stage. Each can be taken only once.
     ahead: Mutex<HashMap<PathBuf, LoadedMesh>>,
@@ -23,7 +23,7 @@ pub(crate) struct GltfContainers {
     generated: Mutex<HashMap<PathBuf, Arc<[u8]>>>,
 }
 
-impl GltfContainers {
+impl OpenAssetFiles {
     /// Returns a glTF file, opening it if necessary.
     ///
     /// # Errors
@@ -55,14 +55,15 @@ impl GltfContainers {
         progress: Progress<'_>,
         token: &CancelToken,
     ) -> Result<LoadedMesh, AssetError> {
-        if let Some(bytes) = self.generated_file(path) {
+        if let Some(bytes) = self.importer_generated_file(path) {
             return load_from_bytes(path, &bytes, progress, token);
         }
         if serialized::has_serialized_extension(path) {
             return serialized::load(path, part, progress, token);
         }
         if !has_gltf_extension(path) {
-            let ahead = self.ahead.lock().unwrap_or_else(PoisonError::into_inner).remove(&canonical(path));
+            let ahead =
+                self.ahead.lock().unwrap_or_else(PoisonError::into_inner).remove(&canonical_path(path));
             return ahead.map_or_else(|| load(path, progress, token), Ok);
         }
         let container = self.open(path, progress, token)?;
@@ -73,18 +74,18 @@ impl GltfContainers {
     }
 
     /// Adds the files that an importer has generated.
-    pub(crate) fn add_generated_files(&self, files: impl Iterator<Item = (PathBuf, Arc<[u8]>)>) {
+    pub(crate) fn add_importer_generated_files(&self, files: impl Iterator<Item = (PathBuf, Arc<[u8]>)>) {
         self.generated.lock().unwrap_or_else(PoisonError::into_inner).extend(files);
     }
 
     /// Returns the bytes of a file that an importer has generated, or `None` for other files.
-    pub(crate) fn generated_file(&self, path: &Path) -> Option<Arc<[u8]>> {
+    pub(crate) fn importer_generated_file(&self, path: &Path) -> Option<Arc<[u8]>> {
         self.generated.lock().unwrap_or_else(PoisonError::into_inner).get(path).cloned()
     }
 
-    /// Stores a mesh returned by [`GltfContainers::load_any_mesh`] for the next call.
+    /// Stores a mesh returned by [`OpenAssetFiles::load_any_mesh`] for the next call.
     pub(crate) fn store_mesh_for_next_load(&self, path: &Path, mesh: LoadedMesh) {
-        self.ahead.lock().unwrap_or_else(PoisonError::into_inner).insert(canonical(path), mesh);
+        self.ahead.lock().unwrap_or_else(PoisonError::into_inner).insert(canonical_path(path), mesh);
     }
 
     /// Returns the bytes or the path of an image used by a glTF file, plus the glTF file's hash.
@@ -113,6 +114,6 @@ pub(crate) enum ImageInput {
 }
 
 /// Canonicalizes a path, so that all paths to a file compare equal. Returns a nonexistent path unchanged.
-pub(super) fn canonical(path: &Path) -> PathBuf {
+pub(super) fn canonical_path(path: &Path) -> PathBuf {
     path.canonicalize().unwrap_or_else(|_| path.to_owned())
 }

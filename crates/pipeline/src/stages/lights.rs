@@ -48,7 +48,7 @@ pub(crate) fn collect_lights(
     if let Some(lights) = cache.lights.get(key).filter(|lights| !lights.is_empty()) {
         return Ok(StageResult::reused(lights.clone(), reasons::UNCHANGED));
     }
-    let environment = environment_source(scene, of, textures, cache);
+    let environment = sky_or_environment_map(scene, of, textures, cache);
     let lights = world::build_lights(scene, geometry, &textures.images, environment, token)?;
     cache.lights.set(key, lights.clone());
     Ok(match lights.len() {
@@ -91,13 +91,13 @@ fn textures_affecting_emission(scene: &Scene) -> impl Iterator<Item = TextureIma
         });
         textures.filter_map(|texture| {
             let image = scene.textures[texture.0].as_image()?;
-            Some(world::scene_material_texture_source(scene, material, texture, image))
+            Some(world::scene_material_image_key(scene, material, texture, image))
         })
     })
 }
 
 /// Returns the environment's sky or map. Reuses it if it is unchanged.
-fn environment_source(
+fn sky_or_environment_map(
     scene: &Scene,
     of: &FingerprintContext<'_>,
     textures: &LoadedTextures,
@@ -109,7 +109,7 @@ fn environment_source(
         cache.sky = Memo::default();
         return map.map(EnvironmentSource::Map);
     };
-    let key = FingerprintHasher::new("sky").add(sky, of).finish();
+    let key = FingerprintHasher::new("sky").add_with_references(sky, of).finish();
     if cache.sky.get(key).is_none() {
         cache.sky.set(key, world::build_sky(sky));
     }

@@ -9,9 +9,11 @@ use super::super::cache::CacheOfNamedValues;
 use super::super::protocol::reasons;
 use super::super::watch::content::{FileContentId, FilePathAndContentId};
 use super::super::words::format_bytes;
-use super::containers::canonical;
+use super::containers::canonical_path;
 use super::mesh_warnings::{MeshWarnings, add_limited_mesh_warnings, warn_about_missing_mesh_data};
-use super::{AbortReason, FileCounts, FileReadContext, Findings, LoadedAsset, StageResult, loading_result};
+use super::{
+    AbortReason, AssetLoadResult, FileCounts, FileReadContext, Findings, StageResult, loading_result,
+};
 use crate::assets::mesh::subdivide::{subdivide, subdivision_memory_bytes};
 use crate::assets::{AssetError, Companion, LoadedMesh};
 use crate::control::{CancelToken, Canceled, Progress};
@@ -69,18 +71,18 @@ pub(crate) fn load_meshes(
             let content = reading.contents.first_seen_content_id(&file.value, reading.token)?;
             if let Some(last) = cache.get_even_if_stale(&name) {
                 // The mesh probably still references the same files, so hash them before they are read.
-                contents_as_seen_by_request(&last.companions, reading)?;
+                content_ids_seen_by_request(&last.companions, reading)?;
             }
             Ok((content, cache.get(&name, mesh_key_without_companions(file, content))))
         })
         .collect::<Result<_, Canceled>>()?;
-    let assets: Vec<LoadedAsset<CachedMesh>> = reading.pool.install(|| {
+    let assets: Vec<AssetLoadResult<CachedMesh>> = reading.pool.install(|| {
         files
             .par_iter()
             .zip(before)
             .map(|(file, (content, kept))| {
                 let load = |_: &Path, progress: Progress<'_>, _: &CancelToken| {
-                    load_subdivided(file, reading, progress)
+                    load_and_subdivide(file, reading, progress)
                 };
                 load_or_reuse_mesh(file, content, kept, reading, load)
             })
@@ -103,7 +105,7 @@ pub(crate) fn load_meshes(
                 mesh
             }
             Err(error) => {
-                let error = AbortReason::asset_error_unless_fatal(error)?;
+                let error = AbortReason::reject_fatal_asset_error(error)?;
                 counts.failed += 1;
                 findings.add_asset_error(loaded, file.span.clone(), &error);
                 let key = mesh_key_without_companions(file, content);
@@ -138,11 +140,11 @@ pub(crate) fn load_meshes(
 pub(crate) type MeshPathAndOptions = (PathBuf, Option<u32>, u32);
 
 fn mesh_path_and_options(file: &MeshFile) -> MeshPathAndOptions {
-    (canonical(&file.value), file.part, file.subdivide)
+    (canonical_path(&file.value), file.part, file.subdivide)
 }
 
 /// Reads a mesh file and subdivides it.
-fn load_subdivided(
+fn load_and_subdivide(
     file: &MeshFile,
     reading: &FileReadContext<'_>,
     progress: Progress<'_>,
@@ -168,14 +170,14 @@ fn load_or_reuse_mesh(
     kept: Option<Arc<CachedMesh>>,
     reading: &FileReadContext<'_>,
     load: impl Fn(&Path, Progress<'_>, &CancelToken) -> Result<LoadedMesh, AssetError>,
-) -> Result<LoadedAsset<CachedMesh>, Canceled> {
+) -> Result<AssetLoadResult<CachedMesh>, Canceled> {
     let path = &file.value;
     let mut files = vec![FilePathAndContentId { path: path.to_owned(), content }];
     if let Some(mesh) = kept
-        && mesh.companions == contents_as_seen_by_request(&mesh.companions, reading)?
+        && mesh.companions == content_ids_seen_by_request(&mesh.companions, reading)?
     {
         files.extend(mesh.companions.iter().cloned());
-        return Ok(LoadedAsset { files, result: Ok((mesh, true)) });
+        return Ok(AssetLoadResult { files, result: Ok((mesh, true)) });
     }
     let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
     let read =
@@ -202,7 +204,7 @@ fn load_or_reuse_mesh(
         }
         Err(error) => Err(error),
     };
-    Ok(LoadedAsset { files, result })
+    Ok(AssetLoadResult { files, result })
 }
 
 /// Whether a file that was missing when the mesh was loaded now exists without having been seen by this
@@ -219,7 +221,7 @@ fn has_companion_appeared(companions: &[Companion], reading: &FileReadContext<'_
 }
 
 /// Returns the files with their contents as first seen by this request.
-fn contents_as_seen_by_request(
+fn content_ids_seen_by_request(
     files: &[FilePathAndContentId],
     reading: &FileReadContext<'_>,
 ) -> Result<Vec<FilePathAndContentId>, Canceled> {
@@ -249,7 +251,7 @@ fn files_using_own_materials_mask(scene: &Scene) -> Vec<bool> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::containers::GltfContainers;
+    use super::super::containers::OpenAssetFiles;
     use super::super::mesh_warnings::MAX_WARNINGS;
     use super::*;
     use crate::sink::EventSink;
@@ -309,7 +311,7 @@ mod tests {
                 token: &token,
                 contents,
                 pool: &self.pool,
-                containers: &GltfContainers::default(),
+                containers: &OpenAssetFiles::default(),
                 available_memory: u64::MAX,
             };
             let mut findings = Findings::default();
@@ -437,7 +439,7 @@ mod tests {
             token: &token,
             contents: &snapshot,
             pool: &fixture.pool,
-            containers: &GltfContainers::default(),
+            containers: &OpenAssetFiles::default(),
             available_memory: u64::MAX,
         };
         let load_and_change = |path: &Path, progress: Progress<'_>, token: &CancelToken| {
@@ -465,7 +467,7 @@ mod tests {
             token: &token,
             contents: &snapshot,
             pool: &fixture.pool,
-            containers: &GltfContainers::default(),
+            containers: &OpenAssetFiles::default(),
             available_memory: u64::MAX,
         };
         let load_and_appear = |path: &Path, progress: Progress<'_>, token: &CancelToken| {

@@ -25,9 +25,9 @@ use std::time::Instant;
 
 use rayon::ThreadPool;
 
-use self::containers::GltfContainers;
+use self::containers::OpenAssetFiles;
 use super::plan::argument_error;
-use super::protocol::{Failure, Status, WriteRequirement, reasons};
+use super::protocol::{Failure, StageStatus, WriteRequirement, reasons};
 use super::sink::EventSink;
 use super::watch::content::{FileHashCache, FilePathAndContentId, FilesSeenByRequest};
 use crate::assets::AssetError;
@@ -81,7 +81,7 @@ impl AbortReason {
     }
 
     /// Returns the error as `Ok` unless it must end the request.
-    pub(super) fn asset_error_unless_fatal(error: AssetError) -> Result<AssetError, Self> {
+    pub(super) fn reject_fatal_asset_error(error: AssetError) -> Result<AssetError, Self> {
         match error {
             AssetError::Canceled(_) => Err(Self::Canceled),
             AssetError::OutOfMemory { .. }
@@ -101,21 +101,21 @@ impl AbortReason {
 #[derive(Debug)]
 pub(super) struct StageResult<T> {
     pub(super) value: T,
-    pub(super) status: Status,
+    pub(super) status: StageStatus,
     pub(super) why: String,
 }
 
 impl<T> StageResult<T> {
     pub(super) fn done(value: T, why: impl Into<String>) -> Self {
-        Self { value, status: Status::Done, why: why.into() }
+        Self { value, status: StageStatus::Done, why: why.into() }
     }
 
     pub(super) fn reused(value: T, why: impl Into<String>) -> Self {
-        Self { value, status: Status::Reused, why: why.into() }
+        Self { value, status: StageStatus::Reused, why: why.into() }
     }
 
     pub(super) fn skipped(value: T, why: impl Into<String>) -> Self {
-        Self { value, status: Status::Skipped, why: why.into() }
+        Self { value, status: StageStatus::Skipped, why: why.into() }
     }
 }
 
@@ -125,7 +125,7 @@ pub(super) struct FileReadContext<'a> {
     pub(super) token: &'a CancelToken,
     pub(super) contents: &'a FilesSeenByRequest,
     pub(super) pool: &'a ThreadPool,
-    pub(super) containers: &'a GltfContainers,
+    pub(super) containers: &'a OpenAssetFiles,
     /// Bytes left for meshes and textures, or [`u64::MAX`] without a limit.
     pub(super) available_memory: u64,
 }
@@ -133,12 +133,12 @@ pub(super) struct FileReadContext<'a> {
 impl FileReadContext<'_> {
     /// Makes the files that exist only in memory readable, and keeps them from being watched.
     pub(super) fn add_generated_files(&self, loaded: &LoadedScene, findings: &mut Findings) {
-        for (path, file) in loaded.generated_files() {
+        for (path, file) in loaded.in_memory_files() {
             self.contents.record_decoded(&path, file.hash);
             findings.generated.insert(path);
         }
-        let files = loaded.generated_files().map(|(path, file)| (path, Arc::clone(&file.bytes)));
-        self.containers.add_generated_files(files);
+        let files = loaded.in_memory_files().map(|(path, file)| (path, Arc::clone(&file.bytes)));
+        self.containers.add_importer_generated_files(files);
     }
 }
 
@@ -248,7 +248,7 @@ impl Findings {
             return Err(AbortReason::Failed(self.take_diagnostics_as_failure()));
         }
         if !found.is_empty() && found != self.conflicts {
-            sink.send_write_conflicts(found.clone());
+            sink.send_write_refused(found.clone());
         }
         self.conflicts = found;
         Ok(())
@@ -273,7 +273,7 @@ fn diagnostic_at_span(
 }
 
 /// Result of loading an asset.
-pub(super) struct LoadedAsset<T> {
+pub(super) struct AssetLoadResult<T> {
     /// The file, followed by the files it references.
     pub(super) files: Vec<FilePathAndContentId>,
     /// The value, and whether it came from the cache.

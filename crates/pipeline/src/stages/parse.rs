@@ -82,7 +82,7 @@ fn scene_failure_from_message(path: &Path, message: String) -> AbortReason {
 ///
 /// # Errors
 /// Returns all errors in the scene file.
-pub(crate) fn parse(
+pub(crate) fn parse_or_reuse_scene(
     origin: SceneParseRequest<'_>,
     memo: &mut Memo<Arc<ParsedScene>>,
     findings: &mut Findings,
@@ -164,8 +164,8 @@ fn read_scene(
         let loaded = foreign.and_then(|()| scene::load(path, sets)).map_err(|errors| {
             AbortReason::Failed(Failure::Scene(add_renamed_file_hint(errors, path, last)))
         })?;
-        let content =
-            contents.record_decoded(path, *blake3::hash(loaded.source.file_text().as_bytes()).as_bytes());
+        let content = contents
+            .record_decoded(path, *blake3::hash(loaded.source.text_without_set_args().as_bytes()).as_bytes());
         return Ok((Arc::new(loaded), content, Vec::new(), Vec::new()));
     };
     let context = ForeignReadContext { view: show, options: foreign, containers, token };
@@ -186,7 +186,7 @@ fn read_scene(
         };
     let content = contents.record_decoded(path, hash);
     let companions = record(&companions)?;
-    let strict = if foreign.is_strict { strict_errors(&substitutions) } else { Vec::new() };
+    let strict = if foreign.is_strict { substitutions_as_errors(&substitutions) } else { Vec::new() };
     let loaded = match strict.is_empty() {
         true => scene_from_document(document, path, sets),
         false => Err(strict),
@@ -199,7 +199,7 @@ fn read_scene(
 }
 
 /// Turns substitutions into errors.
-fn strict_errors(substitutions: &[Diagnostic]) -> Vec<Diagnostic> {
+fn substitutions_as_errors(substitutions: &[Diagnostic]) -> Vec<Diagnostic> {
     let strict = |one: &Diagnostic| Diagnostic {
         severity: Severity::Error,
         help: Some("without --strict, this is a warning".to_owned()),
@@ -235,9 +235,10 @@ fn add_renamed_file_hint(
 ) -> Vec<Diagnostic> {
     let last = last.filter(|last| last.loaded.path == path && !last.loaded.is_foreign());
     if let [error] = &mut errors[..]
-        && scene::is_file_not_found_diagnostic(error)
+        && scene::is_scene_not_found_diagnostic(error)
         && let Some(last) = last
-        && let Some(file) = scene::find_renamed_scene_by_text(path, &last.loaded.source.file_text_as_arc())
+        && let Some(file) =
+            scene::find_renamed_scene_by_text(path, &last.loaded.source.text_without_set_args_as_arc())
     {
         let name = escape_invisible_chars(&file.to_string_lossy()).into_owned();
         error.help = Some(format!("{name} {}; run `glimt {name}` to watch it", scene::SAME_TEXT));

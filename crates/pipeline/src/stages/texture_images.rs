@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::super::watch::content::{FileContentId, FilePathAndContentId};
 use super::FileReadContext;
-use super::containers::{ImageInput, canonical};
+use super::containers::{ImageInput, canonical_path};
 use crate::assets::AssetError;
 use crate::assets::image::{
     ColorEncoding, DecodedImage, EmbeddedImage, ImageLimits, embedded_dimensions_and_memory_size,
@@ -23,7 +23,7 @@ use crate::world::{HashableAlphaCutoff, NeededTexture, TextureImageKey};
 pub(super) type TextureKey = (PathBuf, Option<u32>, ColorEncoding, Option<HashableAlphaCutoff>);
 
 pub(super) fn texture_key(source: &TextureImageKey) -> TextureKey {
-    (canonical(&source.path), source.image, source.encoding, source.coverage)
+    (canonical_path(&source.path), source.image, source.encoding, source.coverage)
 }
 
 /// Decoded texels, and warnings about the parts of the file that were ignored.
@@ -178,7 +178,7 @@ fn decode_image(
     let (one, limits) = (image.asked_by[0], ImageLimits::default());
     let (encoding, token) = (one.source.encoding, reading.token);
     contents.1 = None;
-    if let Some(bytes) = reading.containers.generated_file(image.path()) {
+    if let Some(bytes) = reading.containers.importer_generated_file(image.path()) {
         let within = EmbeddedImage { path: image.path(), bytes };
         let load = |progress: Progress<'_>| load_embedded(within, encoding, limits, progress, token);
         return reading.sink.load_asset_with_progress(&one.name, load);
@@ -219,7 +219,7 @@ fn locate_image_bytes(
     reading: &FileReadContext<'_>,
 ) -> Result<ImageInput, AssetError> {
     match source.image {
-        None => Ok(match reading.containers.generated_file(&source.path) {
+        None => Ok(match reading.containers.importer_generated_file(&source.path) {
             Some(bytes) => ImageInput::Bytes(bytes),
             None => ImageInput::File(source.path.clone()),
         }),

@@ -27,7 +27,7 @@ use crate::scene::description::TextureEncoding;
 use crate::scene::fingerprint::Fingerprint;
 use crate::world::{
     Images, NeededTexture, TexelsAndMipmaps, TextureImageKey, TextureRolesNeededByRender,
-    environment_map_source, textures_needed,
+    environment_map_image_key, textures_needed,
 };
 
 /// Maximum total size of a scene's texels, in bytes.
@@ -142,7 +142,7 @@ pub(crate) fn load_textures(
         };
         return Ok(StageResult::skipped(textures, why));
     }
-    let environment = environment_map_source(&loaded.scene);
+    let environment = environment_map_image_key(&loaded.scene);
     let images = group_by_image(needed, cache, reading)?;
     let assets = load_images_or_reject_excess(&images, MAX_BYTES, reading);
     let mut counts = FileCounts::default();
@@ -185,7 +185,7 @@ pub(crate) fn load_textures(
                 cache.texels.insert(image.name, key, decoded, bytes);
             }
             Err(error) => {
-                let error = AbortReason::asset_error_unless_fatal(error)?;
+                let error = AbortReason::reject_fatal_asset_error(error)?;
                 counts.failed += 1;
                 if !are_required && loaded.is_foreign() && has_model_extension(&loaded.path) {
                     for one in &image.asked_by {
@@ -276,7 +276,7 @@ fn add_check_only_textures(loaded: &LoadedScene, wanted: &mut Vec<NeededTexture>
 mod tests {
     use std::fs;
 
-    use crate::protocol::{Stage, Status};
+    use crate::protocol::{Stage, StageStatus};
     use crate::tests::{Bench, SCENE};
 
     #[test]
@@ -288,9 +288,9 @@ mod tests {
         assert_eq!(report.counters.texels_loaded, 1);
         bench.edit("[0.5, 0.5, 0.5]", "[0.6, 0.5, 0.5]");
         let report = bench.done().0;
-        assert_eq!(report.stages[Stage::Textures as usize].status, Status::Reused);
+        assert_eq!(report.stages[Stage::Textures as usize].status, StageStatus::Reused);
         // Changes must be detected through both names.
         fs::write(bench.path("skin.ppm"), "P6\n1 1\n255\nxyz").expect("written");
-        assert_eq!(bench.done().0.stages[Stage::Textures as usize].status, Status::Done);
+        assert_eq!(bench.done().0.stages[Stage::Textures as usize].status, StageStatus::Done);
     }
 }

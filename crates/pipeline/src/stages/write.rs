@@ -233,7 +233,7 @@ pub(crate) fn write_on_request(
 ) -> bool {
     let conflicts = output_conflicts(to.plan, to.inputs);
     if !conflicts.is_empty() {
-        to.sink.send_write_conflicts(conflicts);
+        to.sink.send_write_refused(conflicts);
         return false;
     }
     to.contents.outputs.mark_images_outdated();
@@ -283,7 +283,7 @@ pub(crate) fn add_frame_and_write_if_last(
             let metadata = encoding_settings_with_relative_scene(plan, path).metadata_with_samples(samples);
             let bytes = animation::encode(&frames, &metadata, format, token)?;
             let write = |guard: &ExistingFilePolicy<'_>| {
-                output::write::atomic_with_policy(path, &bytes, guard, token)
+                output::write::write_atomically_with_policy(path, &bytes, guard, token)
             };
             write_guarded(plan, inputs, OutputTarget::from_image_path(plan, path), None, sink, write)?;
             Ok(bytes.len() as u64)
@@ -314,7 +314,7 @@ fn write_image_file(
     let bytes =
         finish.encode_with_film_metadata(&state.film, image, &layers, Format::from_path(path)?, token)?;
     write_guarded(plan, inputs, OutputTarget::from_image_path(plan, path), Some(sweep), sink, |guard| {
-        output::write::atomic_with_policy(path, &bytes, guard, token)
+        output::write::write_atomically_with_policy(path, &bytes, guard, token)
     })?;
     Ok(bytes.len() as u64)
 }

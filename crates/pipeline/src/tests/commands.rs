@@ -201,7 +201,7 @@ fn nothing_is_rendered_without_a_valid_scene() {
 fn broken_scene_file_does_not_stop_a_render() {
     let mut bench = Bench::with(&SCENE.replace("samples = 4", "samples = 10000"), render_slowly);
     (bench.writing, bench.preview) =
-        (WriteRequirement::Try, Some(MaxPreviewSize { width: 12, height: 12, around: None }));
+        (WriteRequirement::Try, Some(PreviewBounds { width: 12, height: 12, around: None }));
     let first = bench.send();
     while !matches!(bench.next(), Event::Progress { progress, .. } if progress.samples > 0) {}
     bench.edit("width = 40", "width = = 40");
@@ -265,7 +265,7 @@ fn last_valid_scene_applies_new_overrides() {
         for change in changes {
             let mut bench = Bench::new(SCENE);
             bench.writing = WriteRequirement::Try;
-            bench.preview = Some(MaxPreviewSize { width: 12, height: 12, around: None });
+            bench.preview = Some(PreviewBounds { width: 12, height: 12, around: None });
             bench.done();
             fault(&bench);
             assert!(matches!(bench.failed(), Failure::Scene(_)));
@@ -290,7 +290,7 @@ fn last_valid_scene_applies_new_overrides() {
             assert_eq!(bench.picture(), image_after(SCENE, |bench| change(bench, moved)));
             // The fixed scene reuses this image.
             fix(&bench);
-            assert_eq!(bench.done().0.stages[Stage::Render as usize].status, Status::Reused);
+            assert_eq!(bench.done().0.stages[Stage::Render as usize].status, StageStatus::Reused);
         }
     }
 }
@@ -344,7 +344,7 @@ fn priority_region_is_rendered_first() {
     let text = text.replace("samples = 4", "samples = 32");
     let mut bench = Bench::with(&text, render_slowly);
     bench.overrides.view = Some(ViewMode::Samples);
-    bench.preview = Some(MaxPreviewSize { width: 256, height: 256, around: None });
+    bench.preview = Some(PreviewBounds { width: 256, height: 256, around: None });
     bench.first = Some(NormalizedRect { left: 0.0, top: 0.0, width: 0.1, height: 0.1 });
     let of = bench.send();
     // The corner tile, which is usually rendered last, must be complete before the middle tile.
@@ -519,7 +519,7 @@ fn time_limit_ends_a_render() {
     assert!(report.image.samples.max < 1_000_000 && report.image.samples.max > 0);
     assert!(bench.path("out.ppm").exists());
     let (again, unchanged) = bench.done();
-    assert_eq!(again.stages[Stage::Render as usize].status, Status::Reused);
+    assert_eq!(again.stages[Stage::Render as usize].status, StageStatus::Reused);
     assert!(unchanged);
 }
 
@@ -534,7 +534,7 @@ fn unwritable_output_fails_before_rendering() {
 fn image_is_shown_despite_unwritable_output() {
     let mut bench = Bench::new(SCENE);
     bench.overrides.outputs = vec![bench.path("nowhere/out.png")];
-    bench.preview = Some(MaxPreviewSize { width: 12, height: 12, around: None });
+    bench.preview = Some(PreviewBounds { width: 12, height: 12, around: None });
     bench.writing = WriteRequirement::Try;
     let of = bench.send();
     let events = bench.until_end(of);
@@ -546,7 +546,7 @@ fn image_is_shown_despite_unwritable_output() {
     let Some(Event::Done { report, .. }) = events.last() else { panic!("{:?}", events.last()) };
     assert_eq!((report.image.path.as_deref(), report.image.complete), (None, true));
     let write = &report.stages[Stage::Write as usize];
-    assert!(write.status == Status::Skipped && write.why.contains("nowhere"), "{write:?}");
+    assert!(write.status == StageStatus::Skipped && write.why.contains("nowhere"), "{write:?}");
     // Create the folder so that the next request can write the image.
     fs::create_dir(bench.path("nowhere")).expect("a folder");
     assert_statuses(&bench.done().0, "rrrrrsrd");
@@ -569,7 +569,7 @@ fn warnings_are_reported_before_rendering() {
     let mut bench = Bench::new(SCENE);
     // A face with zero area.
     bench.write("one.obj", &format!("{OBJ}f 1 1 2\n"));
-    bench.preview = Some(MaxPreviewSize { width: 20, height: 20, around: None });
+    bench.preview = Some(PreviewBounds { width: 20, height: 20, around: None });
     let of = bench.send();
     let events = bench.until_end(of);
     let at = |what: &dyn Fn(&Event) -> bool| events.iter().position(what).expect("an event");
@@ -647,7 +647,7 @@ fn reused_image_reports_original_render_time() {
     bench.done();
     bench.overrides.shadows = None;
     let (again, _) = bench.done();
-    assert_eq!(again.stages[Stage::Render as usize].status, Status::Reused);
+    assert_eq!(again.stages[Stage::Render as usize].status, StageStatus::Reused);
     assert_eq!(again.image.render_seconds, first.image.render_seconds);
     assert!(first.image.render_seconds > 0.005);
 }

@@ -19,8 +19,8 @@ use std::sync::mpsc::{self, Receiver};
 use std::time::Duration;
 
 use crate::protocol::{
-    Command, Event, Failure, MaxPreviewSize, NormalizedPosition, NormalizedRect, PreviewSlot, PreviewUpdate,
-    Report, Request, Stage, Status, WriteRequirement, reasons,
+    Command, Event, Failure, NormalizedPosition, NormalizedRect, PreviewBounds, PreviewSlot, PreviewUpdate,
+    Report, Request, Stage, StageStatus, WriteRequirement, reasons,
 };
 use crate::scene::LoadedScene;
 use crate::scene::description::ResolvedCamera;
@@ -30,7 +30,7 @@ use crate::settings::Overrides;
 use crate::sink::EventSink;
 use crate::trace::TileKernel;
 use crate::watch::content::FileHashCache;
-use crate::worker::{Handle, start_with_config};
+use crate::worker::{WorkerHandle, start_worker_with_config};
 
 /// Loads a scene from text, with a default camera.
 pub(crate) fn loaded_of(text: &str) -> LoadedScene {
@@ -92,21 +92,21 @@ pub(crate) fn sink_with_channel(generation: u64) -> (EventSink, Receiver<Event>)
 pub(super) fn start_worker(
     config: SessionConfig,
     contents: &Arc<FileHashCache>,
-) -> (Handle, Receiver<Event>) {
+) -> (WorkerHandle, Receiver<Event>) {
     let (sink, events) = sink_with_channel(0);
-    (start_with_config(config, Arc::clone(contents), sink.listener).expect("a thread"), events)
+    (start_worker_with_config(config, Arc::clone(contents), sink.listener).expect("a thread"), events)
 }
 
 pub(crate) struct Bench {
     pub(super) folder: tempfile::TempDir,
     /// File name of the scene or model.
     pub(super) scene: &'static str,
-    pub(super) worker: Handle,
+    pub(super) worker: WorkerHandle,
     pub(super) events: Receiver<Event>,
     pub(super) contents: Arc<FileHashCache>,
     pub(super) generation: u64,
     pub(super) overrides: Overrides,
-    pub(super) preview: Option<MaxPreviewSize>,
+    pub(super) preview: Option<PreviewBounds>,
     pub(super) force: bool,
     pub(super) first: Option<NormalizedRect>,
     pub(super) writing: WriteRequirement,
@@ -240,10 +240,10 @@ pub(super) fn statuses(report: &Report) -> String {
     let names: Vec<Stage> = report.stages.iter().map(|stage| stage.name).collect();
     assert_eq!(names, Stage::ALL);
     let letter = |status| match status {
-        Status::Done => 'd',
-        Status::Reused => 'r',
-        Status::Skipped => 's',
-        Status::Running => '?',
+        StageStatus::Done => 'd',
+        StageStatus::Reused => 'r',
+        StageStatus::Skipped => 's',
+        StageStatus::Running => '?',
     };
     report.stages.iter().map(|stage| letter(stage.status)).collect()
 }

@@ -18,7 +18,7 @@ fn wrapped(count: u32) -> String {
 /// Waits until the photons stage is running.
 fn until_first_are_sent(bench: &Bench) {
     let is_it = |event: &Event| match event {
-        Event::Stage { stage, .. } => stage.name == Stage::Photons && stage.status == Status::Running,
+        Event::Stage { stage, .. } => stage.name == Stage::Photons && stage.status == StageStatus::Running,
         _ => false,
     };
     while !is_it(&bench.next()) {}
@@ -96,7 +96,7 @@ fn previews_of(bench: &mut Bench) -> Vec<(bool, bool)> {
                 previews.extend(latest.map(|latest| (latest.lacks_photons, are_there)));
             }
             Event::Stage { stage, .. } if stage.name == Stage::Photons => {
-                are_there = stage.status != Status::Running;
+                are_there = stage.status != StageStatus::Running;
             }
             Event::Done { generation, .. } if generation == of => return previews,
             _ => {}
@@ -107,7 +107,7 @@ fn previews_of(bench: &mut Bench) -> Vec<(bool, bool)> {
 #[test]
 fn first_preview_does_not_wait_for_photons() {
     let mut bench = Bench::with(&wrapped(300_000), without);
-    bench.preview = Some(MaxPreviewSize { width: 12, height: 12, around: None });
+    bench.preview = Some(PreviewBounds { width: 12, height: 12, around: None });
     let previews = previews_of(&mut bench);
     assert_eq!(previews.first(), Some(&(true, false)), "{previews:?}");
     assert!(WITHOUT.load(Ordering::SeqCst));
@@ -122,7 +122,7 @@ fn first_preview_does_not_wait_for_photons() {
 
 #[test]
 fn preview_without_photons_does_not_affect_film() {
-    let mut pictures = [None, Some(MaxPreviewSize { width: 12, height: 12, around: None })].map(|preview| {
+    let mut pictures = [None, Some(PreviewBounds { width: 12, height: 12, around: None })].map(|preview| {
         let mut bench = Bench::new(&wrapped(1000));
         bench.preview = preview;
         bench.done();
@@ -181,7 +181,7 @@ fn each_skip_of_photons_reports_its_own_reason() {
         (stage.status, stage.why.clone())
     };
     let first = reason(None);
-    assert_eq!(first, (Status::Skipped, reasons::NO_SPECULAR_SURFACES.to_owned()));
+    assert_eq!(first, (StageStatus::Skipped, reasons::NO_SPECULAR_SURFACES.to_owned()));
     assert_ne!(reason(Some(crate::scene::description::Integrator::Path)), first);
     assert_eq!(reason(None), first);
 }

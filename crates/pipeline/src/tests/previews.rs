@@ -7,12 +7,12 @@ use crate::settings::ViewMode;
 #[test]
 fn preview_size_change_does_not_render() {
     let mut bench = Bench::new(SCENE);
-    bench.preview = Some(MaxPreviewSize { width: 12, height: 12, around: None });
+    bench.preview = Some(PreviewBounds { width: 12, height: 12, around: None });
     let generation = bench.send();
     assert!(bench.until_end(generation).iter().any(|event| matches!(event, Event::Preview { .. })));
     let latest = bench.worker.previews.lock().expect("not poisoned").clone().expect("a preview");
     assert_eq!((latest.generation, latest.picture.width, latest.picture.height), (generation, 12, 9));
-    bench.preview = Some(MaxPreviewSize { width: 20, height: 30, around: None });
+    bench.preview = Some(PreviewBounds { width: 20, height: 30, around: None });
     assert_statuses(&bench.done().0, "rrrrrsrr");
     let latest = bench.worker.previews.lock().expect("not poisoned").clone().expect("a preview");
     assert_eq!((latest.picture.width, latest.picture.height), (20, 15));
@@ -21,7 +21,7 @@ fn preview_size_change_does_not_render() {
 #[test]
 fn close_up_shows_image_pixels() {
     let mut bench = Bench::new(SCENE);
-    bench.preview = Some(MaxPreviewSize { width: 40, height: 30, around: None });
+    bench.preview = Some(PreviewBounds { width: 40, height: 30, around: None });
     bench.done();
     let latest =
         |bench: &Bench| bench.worker.previews.lock().expect("not poisoned").clone().expect("a preview");
@@ -29,7 +29,7 @@ fn close_up_shows_image_pixels() {
     assert_eq!((whole.picture.width, whole.section), (40, None));
     for (spot, left, top) in [((0.5, 0.5), 14, 11), ((0.0, 1.0), 0, 22), ((2.0, -1.0), 28, 0)] {
         let around = Some(NormalizedPosition { x: spot.0, y: spot.1 });
-        bench.preview = Some(MaxPreviewSize { width: 12, height: 8, around });
+        bench.preview = Some(PreviewBounds { width: 12, height: 8, around });
         assert_statuses(&bench.done().0, "rrrrrsrr");
         let PreviewUpdate { picture, section, .. } = latest(&bench);
         let section = section.expect("a part");
@@ -41,7 +41,7 @@ fn close_up_shows_image_pixels() {
         }
     }
     bench.preview =
-        Some(MaxPreviewSize { width: 200, height: 200, around: Some(NormalizedPosition { x: 0.3, y: 0.3 }) });
+        Some(PreviewBounds { width: 200, height: 200, around: Some(NormalizedPosition { x: 0.3, y: 0.3 }) });
     bench.done();
     assert_eq!(
         latest(&bench).picture,
@@ -53,7 +53,7 @@ fn close_up_shows_image_pixels() {
 #[test]
 fn previews_identify_their_image() {
     let mut bench = Bench::new(SCENE);
-    bench.preview = Some(MaxPreviewSize { width: 12, height: 12, around: None });
+    bench.preview = Some(PreviewBounds { width: 12, height: 12, around: None });
     let source = |bench: &mut Bench| {
         bench.done();
         let latest = bench.worker.previews.lock().expect("not poisoned").clone().expect("a preview");
@@ -63,7 +63,7 @@ fn previews_identify_their_image() {
     };
     let own = source(&mut bench);
     // A different size, a comment or a new render does not change the image's identity.
-    bench.preview = Some(MaxPreviewSize { width: 20, height: 30, around: None });
+    bench.preview = Some(PreviewBounds { width: 20, height: 30, around: None });
     assert!(source(&mut bench) == own);
     bench.edit("[camera]", "# a comment\n[camera]");
     assert!(source(&mut bench) == own);
@@ -87,7 +87,7 @@ fn previews_identify_their_image() {
 #[test]
 fn time_limited_renders_are_distinct_images() {
     let mut bench = Bench::with(&SCENE.replace("samples = 4", "samples = 1000000"), render_slowly);
-    bench.preview = Some(MaxPreviewSize { width: 12, height: 12, around: None });
+    bench.preview = Some(PreviewBounds { width: 12, height: 12, around: None });
     bench.overrides.time_seconds = Some(0.2);
     let mut images = Vec::new();
     for force in [false, false, true] {
@@ -107,7 +107,7 @@ fn time_limited_renders_are_distinct_images() {
 #[test]
 fn preview_size_change_does_not_interrupt() {
     let mut bench = Bench::with(&SCENE.replace("samples = 4", "samples = 1000000"), render_slowly);
-    bench.preview = Some(MaxPreviewSize { width: 12, height: 12, around: None });
+    bench.preview = Some(PreviewBounds { width: 12, height: 12, around: None });
     let of = bench.send();
     while !matches!(bench.next(), Event::Progress { progress, .. } if progress.samples > 0) {}
     let until_wide = |bench: &Bench, wide: u32| {
@@ -121,7 +121,7 @@ fn preview_size_change_does_not_interrupt() {
             }
         }
     };
-    let order = |width| Command::Preview(Some(MaxPreviewSize { width, height: 100, around: None }));
+    let order = |width| Command::Preview(Some(PreviewBounds { width, height: 100, around: None }));
     bench.worker.send(order(24));
     until_wide(&bench, 24);
     bench.worker.send(Command::Pause(true));
@@ -138,7 +138,7 @@ fn preview_and_image_share_the_depth_range() {
     let mut bench = Bench::new(SCENE);
     bench.overrides.view = Some(ViewMode::Depth);
     for (width, around) in [(7, None), (40, None), (6, Some(NormalizedPosition { x: 0.5, y: 0.5 }))] {
-        bench.preview = Some(MaxPreviewSize { width, height: 30, around });
+        bench.preview = Some(PreviewBounds { width, height: 30, around });
         let (report, _) = bench.done();
         let shown = bench.worker.previews.lock().expect("not poisoned").take().expect("an image");
         assert!(report.image.range.is_some());

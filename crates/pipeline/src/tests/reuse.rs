@@ -104,7 +104,7 @@ fn companion_file_change_reloads_the_mesh() {
     assert_statuses(&bench.done().0, "rrrrrsrr");
     bench.write("one.mtl", "newmtl a\nKd 0 1 0\n");
     let report = bench.done().0;
-    assert_eq!(report.stages[Stage::Meshes as usize].status, Status::Done);
+    assert_eq!(report.stages[Stage::Meshes as usize].status, StageStatus::Done);
 }
 
 /// One file of each kind that a scene can reference: its name, old text and new text. The test replaces the
@@ -290,7 +290,7 @@ fn toggling_a_setting_back_reuses_the_film() {
     let soft = bench.picture();
     bench.overrides.shadows = Some(ShadowMode::Off);
     let (report, _) = bench.done();
-    assert_eq!(report.stages[Stage::Render as usize].status, Status::Done);
+    assert_eq!(report.stages[Stage::Render as usize].status, StageStatus::Done);
     assert_eq!(report.counters.films, 2);
     assert!(report.counters.film_memory_bytes >= 2 * 40 * 30 * 28);
     bench.overrides.shadows = None;
@@ -304,7 +304,7 @@ fn toggling_a_setting_back_reuses_the_film() {
     assert_eq!(report.counters.camera_rays, 0);
     assert_eq!(bench.picture(), soft);
     bench.force = true;
-    assert_eq!(bench.done().0.stages[Stage::Render as usize].status, Status::Done, "forced");
+    assert_eq!(bench.done().0.stages[Stage::Render as usize].status, StageStatus::Done, "forced");
 }
 
 #[test]
@@ -449,7 +449,7 @@ fn broken_scene_keeps_its_assets() {
     bench.edit("width = = 40", "width = 40");
     // An invalid scene is not cached, so the scene is parsed again, but no other stage runs.
     let (report, unchanged) = bench.done();
-    assert_eq!(report.stages[Stage::Meshes as usize].status, Status::Reused);
+    assert_eq!(report.stages[Stage::Meshes as usize].status, StageStatus::Reused);
     assert!(unchanged);
 }
 

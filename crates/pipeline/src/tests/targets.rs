@@ -29,7 +29,7 @@ fn image_is_shown_despite_conflict() {
     let (good, report) = (bench.path("good.png"), bench.path("r.json"));
     bench.overrides.outputs = vec![good.clone(), bench.path("skin.ppm")];
     bench.overrides.report = Some(report.clone());
-    bench.preview = Some(MaxPreviewSize { width: 12, height: 12, around: None });
+    bench.preview = Some(PreviewBounds { width: 12, height: 12, around: None });
     bench.writing = WriteRequirement::Try;
     let of = bench.send();
     let events = bench.until_end(of);
@@ -44,7 +44,7 @@ fn image_is_shown_despite_conflict() {
     assert_eq!(events.iter().filter(|event| is_refusal(event)).count(), 1, "once");
     let Some(Event::Done { report: made, warnings, .. }) = end else { panic!("{end:?}") };
     assert_eq!((made.image.path.as_deref(), made.image.complete), (None, true));
-    assert_eq!(made.stages[Stage::Write as usize].status, Status::Skipped);
+    assert_eq!(made.stages[Stage::Write as usize].status, StageStatus::Skipped);
     assert!(
         warnings.iter().any(|one| one.message == conflicts[0]),
         "the conflict should still be reported at the end"

@@ -114,7 +114,7 @@ impl ChangeDebouncer {
     }
 
     /// Whether the reported change has settled. Returns true only once per change.
-    pub(super) fn take_reported_change_settled(&mut self, now: Instant) -> bool {
+    pub(super) fn clear_if_settled(&mut self, now: Instant) -> bool {
         let settles = self.unsettled.is_some_and(|unsettled| self.settled_at(unsettled) <= now);
         self.unsettled = self.unsettled.filter(|_| !settles);
         settles

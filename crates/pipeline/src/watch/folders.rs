@@ -32,13 +32,13 @@ pub(super) struct WatchedFolders {
     /// Folders to watch, and whether each is on a network file system, which sends no notifications.
     wanted: HashMap<PathBuf, bool>,
     /// Watched folders, with their identities at the time they were added.
-    watched: HashMap<PathBuf, Identity>,
+    watched: HashMap<PathBuf, FolderIdentity>,
 }
 
 /// A folder's device and inode, which differ if another folder takes its name.
-type Identity = (u64, u64);
+type FolderIdentity = (u64, u64);
 
-fn folder_identity(folder: &Path) -> Option<Identity> {
+fn folder_identity(folder: &Path) -> Option<FolderIdentity> {
     fs::metadata(folder).ok().map(|metadata| (metadata.dev(), metadata.ino()))
 }
 

@@ -29,7 +29,7 @@ pub use self::content::{FileHashCache, FilePathAndContentId};
 use self::folders::{ChangeHint, WatchedFolders};
 use self::outputs::PossiblyTransientChanges;
 pub use self::outputs::{ExternalChange, OutputChange};
-pub use self::working_folder::find_missing_parent_or_working_folder;
+pub use self::working_folder::find_missing_folder;
 use crate::control::CancelToken;
 use crate::system::threads::spawn;
 
@@ -201,7 +201,7 @@ impl<F: FnMut(WatchEvent)> WatchThread<F> {
                 Ok(Message::Hint(hint)) => self.change_debouncer.add_hint(hint, Instant::now()),
                 Ok(Message::Files(read, before, since)) => self.set_files(read, before, since),
                 Ok(Message::Outputs) => self.update_watched_folders(),
-                Err(RecvTimeoutError::Timeout) => self.check(Instant::now()),
+                Err(RecvTimeoutError::Timeout) => self.check_and_report_changes(Instant::now()),
                 Ok(Message::Quit) | Err(RecvTimeoutError::Disconnected) => return,
             }
         }
@@ -251,7 +251,7 @@ impl<F: FnMut(WatchEvent)> WatchThread<F> {
     }
 
     /// Checks all files and reports changes.
-    fn check(&mut self, now: Instant) {
+    fn check_and_report_changes(&mut self, now: Instant) {
         self.has_working_folder = working_folder::reenter_working_folder_if_removed();
         self.folders.renew_lost();
         for change in self.suspects.take_confirmed(&self.contents, self.quiet, now) {
@@ -266,7 +266,7 @@ impl<F: FnMut(WatchEvent)> WatchThread<F> {
             let noticed = self.change_debouncer.mark_reported(now);
             (self.say)(WatchEvent::Changed(ContentChangeTime { noticed }));
         }
-        if self.change_debouncer.take_reported_change_settled(now) {
+        if self.change_debouncer.clear_if_settled(now) {
             (self.say)(WatchEvent::Settled);
         }
     }

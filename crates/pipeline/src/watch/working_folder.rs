@@ -28,7 +28,7 @@ fn is_working_folder_removed() -> bool {
 }
 
 /// Returns the missing folder that makes the file inaccessible: the working directory or the file's parent.
-pub fn find_missing_parent_or_working_folder(file: &Path) -> Option<PathBuf> {
+pub fn find_missing_folder(file: &Path) -> Option<PathBuf> {
     if is_working_folder_removed() && file.is_relative() {
         return HOME.get().cloned();
     }

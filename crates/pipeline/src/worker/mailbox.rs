@@ -8,7 +8,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
 use crate::control::CancelToken;
 use crate::key_overrides::KeyboardOverrides;
-use crate::protocol::{Command, Event, Failure, MaxPreviewSize, Request, WriteRequirement};
+use crate::protocol::{Command, Event, Failure, PreviewBounds, Request, WriteRequirement};
 use crate::queries::QueryOrEdit;
 use crate::render::checkpointer::Interruption;
 use crate::render::commands::PendingCommands;
@@ -32,7 +32,7 @@ struct Mailbox {
     /// The current request's overrides that the user can change with keys.
     shown: KeyboardOverrides,
     /// Pending preview size change.
-    preview: Option<Option<MaxPreviewSize>>,
+    preview: Option<Option<PreviewBounds>>,
     queries: VecDeque<QueryOrEdit>,
     /// Whether the newest request is paused.
     paused: bool,
@@ -53,7 +53,7 @@ pub(super) enum Task {
     /// A request, with the tokens for the render and the write stage.
     Render(Box<Request>, CancelToken, CancelToken),
     Write,
-    Preview(Option<MaxPreviewSize>, CancelToken),
+    Preview(Option<PreviewBounds>, CancelToken),
     Query(QueryOrEdit),
     Quit,
 }
@@ -194,7 +194,7 @@ impl PendingCommands for CommandSender {
         is_taken
     }
 
-    fn take_preview_resize(&self) -> Option<Option<MaxPreviewSize>> {
+    fn take_preview_resize(&self) -> Option<Option<PreviewBounds>> {
         self.lock().preview.take()
     }
 

@@ -259,7 +259,7 @@ impl Fingerprinted for Camera {
                     .add_dvec3(*position)
                     .add_dvec3(*look_at)
                     .add_dvec3(*up)
-                    .add(projection, of)
+                    .add_with_references(projection, of)
                     .add_f64(*aperture)
                     .add_f64(*focus);
                 window
@@ -268,7 +268,7 @@ impl Fingerprinted for Camera {
             Self::Orbiter { file: _, projection, window, aperture, focus } => {
                 key.add_usize(1).add_f64(*aperture).add_bool(projection.is_some());
                 if let Some(projection) = projection {
-                    key.add(projection, of);
+                    key.add_with_references(projection, of);
                 }
                 // 0 is not a valid distance.
                 key.add_f64(focus.unwrap_or(0.0)).add_str(of.orbiter.unwrap_or(""));

@@ -235,7 +235,7 @@ impl Fingerprinted for Environment {
             }
         };
         if let Some(sky) = sky {
-            key.add_str("sky").add(sky, of);
+            key.add_str("sky").add_with_references(sky, of);
         }
         if let Some(file) = file {
             key.add_path_bytes(&file.value);

@@ -284,28 +284,39 @@ impl Fingerprinted for MaterialKind {
     fn add_to_fingerprint(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         match self {
             Self::Phong(PhongParameters { diffuse, specular, shininess, ambient, diffuse_transmission }) => {
-                key.add_usize(0).add_f32(*shininess).add(diffuse, of).add(specular, of).add(ambient, of);
-                key.add(diffuse_transmission, of);
+                key.add_usize(0)
+                    .add_f32(*shininess)
+                    .add_with_references(diffuse, of)
+                    .add_with_references(specular, of)
+                    .add_with_references(ambient, of);
+                key.add_with_references(diffuse_transmission, of);
             }
             Self::Mirror { reflectance } => {
-                key.add_usize(1).add(reflectance, of);
+                key.add_usize(1).add_with_references(reflectance, of);
             }
             Self::Glass { ior, tint, roughness, distribution } => {
                 key.add_usize(2)
                     .add_f32(*ior)
                     .add_dvec3(*tint)
-                    .add(roughness, of)
+                    .add_with_references(roughness, of)
                     .add_choice_name(*distribution);
             }
             Self::Pane { ior, tint } => {
-                key.add_usize(3).add_f32(*ior).add(tint, of);
+                key.add_usize(3).add_f32(*ior).add_with_references(tint, of);
             }
             Self::Metal { fresnel, roughness, anisotropy, distribution } => {
-                key.add_usize(6).add(fresnel, of).add(roughness, of).add(anisotropy, of);
+                key.add_usize(6)
+                    .add_with_references(fresnel, of)
+                    .add_with_references(roughness, of)
+                    .add_with_references(anisotropy, of);
                 key.add_choice_name(*distribution);
             }
             Self::Plastic { diffuse, specular, ior, roughness, distribution, nonlinear } => {
-                key.add_usize(4).add(diffuse, of).add(specular, of).add_f32(*ior).add(roughness, of);
+                key.add_usize(4)
+                    .add_with_references(diffuse, of)
+                    .add_with_references(specular, of)
+                    .add_f32(*ior)
+                    .add_with_references(roughness, of);
                 key.add_choice_name(*distribution).add_bool(*nonlinear);
             }
             Self::Principled {
@@ -318,13 +329,22 @@ impl Fingerprinted for MaterialKind {
                 transmission,
                 diffuse_transmission,
             } => {
-                key.add_usize(5).add(color, of).add(metallic, of).add(roughness, of).add_f32(*ior);
-                key.add(specular, of).add(specular_color, of).add(transmission, of);
-                key.add(diffuse_transmission, of);
+                key.add_usize(5)
+                    .add_with_references(color, of)
+                    .add_with_references(metallic, of)
+                    .add_with_references(roughness, of)
+                    .add_f32(*ior);
+                key.add_with_references(specular, of)
+                    .add_with_references(specular_color, of)
+                    .add_with_references(transmission, of);
+                key.add_with_references(diffuse_transmission, of);
             }
             Self::Blend { weight, parts } => {
                 let [first, second] = &**parts;
-                key.add_usize(7).add(weight, of).add(first, of).add(second, of);
+                key.add_usize(7)
+                    .add_with_references(weight, of)
+                    .add_with_references(first, of)
+                    .add_with_references(second, of);
             }
         }
     }
@@ -333,7 +353,12 @@ impl Fingerprinted for MaterialKind {
 impl Fingerprinted for Material {
     fn add_to_fingerprint(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         let Self { name: _, kind, sides, emission, normal_map, bump, opacity, coat } = self;
-        key.add(kind, of).add(emission, of).add(normal_map, of).add(bump, of).add(opacity, of).add(coat, of);
+        key.add_with_references(kind, of)
+            .add_with_references(emission, of)
+            .add_with_references(normal_map, of)
+            .add_with_references(bump, of)
+            .add_with_references(opacity, of)
+            .add_with_references(coat, of);
         key.add_choice_name(*sides);
     }
 }

@@ -458,8 +458,10 @@ impl Fingerprinted for Shape {
             Self::Torus { center, axis, radius, tube } => {
                 key.add_usize(8).add_dvec3(*center).add_dvec3(*axis).add_f64(*radius).add_f64(*tube)
             }
-            Self::Mesh(mesh) => key.add_usize(9).add(mesh, of),
-            Self::Transformed { shape, matrix } => key.add_usize(10).add(matrix, of).add(&**shape, of),
+            Self::Mesh(mesh) => key.add_usize(9).add_with_references(mesh, of),
+            Self::Transformed { shape, matrix } => {
+                key.add_usize(10).add_with_references(matrix, of).add_with_references(&**shape, of)
+            }
         };
     }
 }
@@ -468,6 +470,6 @@ impl Fingerprinted for MeshReference {
     fn add_to_fingerprint(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         // Vertex colors do not affect the geometry.
         let Self { file, placed, smooth, vertex_colors: _ } = *self;
-        key.add_fingerprint(&of.meshes[file]).add_bool(smooth).add(&placed, of);
+        key.add_fingerprint(&of.meshes[file]).add_bool(smooth).add_with_references(&placed, of);
     }
 }

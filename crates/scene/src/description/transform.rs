@@ -99,7 +99,7 @@ impl Fingerprinted for ObjectTransform {
             Self::Steps { scale, rotate, translate } => {
                 key.add_usize(0).add_dvec3(scale).add_dvec3(rotate).add_dvec3(translate)
             }
-            Self::Matrix(map) => key.add_usize(1).add(&map, of),
+            Self::Matrix(map) => key.add_usize(1).add_with_references(&map, of),
         };
     }
 }

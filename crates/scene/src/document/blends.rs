@@ -49,7 +49,9 @@ pub(super) fn resolve_blends(
     let count = read.len();
     let mut resolver =
         BlendResolver { context, materials: read.into_iter().map(ResolutionProgress::Pending).collect() };
-    (0..count).map(|index| resolver.resolve(index, 0).ok().flatten().map(|material| *material)).collect()
+    (0..count)
+        .map(|index| resolver.resolve_material(index, 0).ok().flatten().map(|material| *material))
+        .collect()
 }
 
 /// A blend that contains itself.
@@ -62,7 +64,7 @@ struct BlendResolver<'a> {
 
 impl BlendResolver<'_> {
     /// Resolves a material at the nesting depth `depth`.
-    fn resolve(&mut self, index: usize, depth: usize) -> Result<Option<Box<Material>>, BlendCycle> {
+    fn resolve_material(&mut self, index: usize, depth: usize) -> Result<Option<Box<Material>>, BlendCycle> {
         let material = match std::mem::replace(&mut self.materials[index], ResolutionProgress::Active) {
             ResolutionProgress::Active => return Err(BlendCycle),
             ResolutionProgress::Done(material) => material,
@@ -89,7 +91,7 @@ impl BlendResolver<'_> {
             error(too_many, remove);
             return None;
         }
-        let [first, second] = match parts.map(|part| self.resolve(part, depth + 1)) {
+        let [first, second] = match parts.map(|part| self.resolve_material(part, depth + 1)) {
             [Ok(first), Ok(second)] => [first?, second?],
             [Err(BlendCycle), _] | [_, Err(BlendCycle)] => {
                 error(format!("the blend \"{shown}\" contains itself"), "blend other materials");

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use super::super::diagnostic::{Diagnostic, Severity};
 use super::super::report::LineIndex;
 use super::super::source::SceneText;
-use super::super::toml::GeneratedFile;
+use super::super::toml::InMemoryFile;
 
 /// A file that is being read.
 pub(super) struct FileContext<'a> {
@@ -22,7 +22,7 @@ pub(super) struct FileContext<'a> {
     counts: Cell<[usize; 2]>,
     searches: Cell<NameSearchCounts>,
     /// Files that exist only in memory.
-    generated: Arc<BTreeMap<String, GeneratedFile>>,
+    generated: Arc<BTreeMap<String, InMemoryFile>>,
 }
 
 /// Number of searches for similar names, and number of names compared in them.
@@ -105,7 +105,7 @@ impl<'a> FileContext<'a> {
     }
 
     /// Sets the files that exist only in memory.
-    pub(super) fn with_generated_files(self, generated: Arc<BTreeMap<String, GeneratedFile>>) -> Self {
+    pub(super) fn with_in_memory_files(self, generated: Arc<BTreeMap<String, InMemoryFile>>) -> Self {
         Self { generated, ..self }
     }
 
@@ -141,8 +141,8 @@ impl<'a> FileContext<'a> {
     }
 
     /// The file's text.
-    pub(super) fn file_text(&self) -> &str {
-        self.source.file_text()
+    pub(super) fn text_without_set_args(&self) -> &str {
+        self.source.text_without_set_args()
     }
 
     /// Returns the text at `span`, or an empty string if `span` is out of range.
@@ -232,7 +232,7 @@ impl<'a> FileContext<'a> {
         issues.sort_by_key(place);
         if unshown > 0 {
             let message = format!("and {unshown} {MORE_LIKE_THESE}");
-            let end = self.source.file_text().len();
+            let end = self.source.text_without_set_args().len();
             let make = if unshown_errors > 0 { Issue::error } else { Issue::warning };
             issues.push(make(end..end, message));
         }

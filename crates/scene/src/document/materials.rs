@@ -268,7 +268,7 @@ impl<'a> MaterialReader<'a> {
     }
 
     /// Reads a number or a texture.
-    fn number(&self, name: &str) -> NumberSource {
+    fn number_or_texture(&self, name: &str) -> NumberSource {
         self.key(name).read_or_default(|key| key.number_or_texture(self.textures))
     }
 
@@ -300,7 +300,7 @@ impl<'a> MaterialReader<'a> {
     fn read_glass(&self) -> Option<MaterialKind> {
         let ior = self.untextured_number("ior");
         let (tint, thin) = (self.key("tint"), self.key("thin"));
-        let roughness = self.number("roughness");
+        let roughness = self.number_or_texture("roughness");
         let distribution = self.read_distribution(roughness);
         // If `thin` is present but invalid, the user probably wants a pane.
         if !thin.boolean().unwrap_or(thin.is_present()) {
@@ -322,7 +322,8 @@ impl<'a> MaterialReader<'a> {
 
     fn read_metal(&self) -> Option<MaterialKind> {
         let fresnel = self.read_metal_reflectance();
-        let (roughness, anisotropy) = (self.number("roughness"), self.number("anisotropy"));
+        let (roughness, anisotropy) =
+            (self.number_or_texture("roughness"), self.number_or_texture("anisotropy"));
         let distribution = self.read_distribution(roughness);
         Some(MaterialKind::Metal { roughness, anisotropy, distribution, fresnel: fresnel? })
     }
@@ -370,7 +371,7 @@ impl<'a> MaterialReader<'a> {
     }
 
     fn read_plastic(&self) -> MaterialKind {
-        let roughness = self.number("roughness");
+        let roughness = self.number_or_texture("roughness");
         MaterialKind::Plastic {
             diffuse: self.color_or_texture("diffuse"),
             specular: self.color_or_texture("specular"),
@@ -390,12 +391,12 @@ impl<'a> MaterialReader<'a> {
         MaterialKind::Principled {
             color,
             diffuse_transmission,
-            metallic: self.number("metallic"),
-            roughness: self.number("roughness"),
+            metallic: self.number_or_texture("metallic"),
+            roughness: self.number_or_texture("roughness"),
             ior: self.untextured_number("ior"),
-            specular: self.number("specular"),
+            specular: self.number_or_texture("specular"),
             specular_color: self.color_or_texture("specular_color"),
-            transmission: self.number("transmission"),
+            transmission: self.number_or_texture("transmission"),
         }
     }
 
@@ -405,7 +406,7 @@ impl<'a> MaterialReader<'a> {
             let help = format!("set `{}` on the materials of the blend", key.name);
             self.table.reject_key(key.name, &format!("a blend cannot have `{}`", key.name), Some(&help));
         }
-        let (pair, weight) = (self.key("materials"), self.number("weight"));
+        let (pair, weight) = (self.key("materials"), self.number_or_texture("weight"));
         let parts = pair.index_pair_by_names(materials);
         self.table.report_unknown_and_missing_keys();
         Some(UnresolvedBlend { name, weight, parts: parts?, span: pair.value_span()? })

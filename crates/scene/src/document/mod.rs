@@ -47,7 +47,7 @@ pub(super) use syntax::MISSING_VALUE;
 /// Reads and validates a scene. Relative paths are resolved against the folder of `path`.
 pub(super) fn parse_and_lower(source: &SceneText, path: &Path) -> ParseOutcome {
     let context = FileContext::new(source.clone(), path);
-    let text = source.file_text();
+    let text = source.text_without_set_args();
     if text.trim_start_matches('\u{feff}').trim().is_empty() {
         let help = NEW_SCENE_HELP;
         context.report(Issue::error(0..0, "the scene file is empty").with_help(help));
@@ -75,7 +75,7 @@ pub(super) fn parse_and_lower(source: &SceneText, path: &Path) -> ParseOutcome {
 /// Validates a document that was built in memory.
 pub(super) fn lower_built(source: &SceneText, built: &SceneDocumentBuilder, path: &Path) -> ParseOutcome {
     let document = &built.document;
-    let context = FileContext::new(source.clone(), path).with_generated_files(Arc::clone(&built.generated));
+    let context = FileContext::new(source.clone(), path).with_in_memory_files(Arc::clone(&built.generated));
     let is_overridden = source.override_arg_offsets().next().is_some();
     let overridden = is_overridden.then(|| sets::apply_set_args(&context, source, document.clone()));
     lower(context, overridden.as_ref().unwrap_or(document), &[])
@@ -109,7 +109,7 @@ fn render_and_photons_value_spans(document: &Document<'_>) -> Vec<SettingSpan> {
 /// Reads only a scene's camera. Returns `None` if there are errors.
 pub(super) fn parse_camera(source: &SceneText) -> Option<Camera> {
     let context = FileContext::new(source.clone(), Path::new(""));
-    let (document, errors) = toml::parse(source.file_text());
+    let (document, errors) = toml::parse(source.text_without_set_args());
     let document = sets::apply_set_args(&context, source, document);
     let camera = camera::read_camera(&TableReader::root(&context, document.root()));
     camera.filter(|_| errors.is_empty() && !context.has_errors())

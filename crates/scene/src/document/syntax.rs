@@ -15,7 +15,7 @@ pub(super) fn report_errors_and_collect_broken_lines(
     context: &FileContext<'_>,
     mut errors: Vec<SyntaxError>,
 ) -> Vec<Range<usize>> {
-    let lists = LazyBracketIndex { text: context.file_text(), brackets: OnceCell::new() };
+    let lists = LazyBracketIndex { text: context.text_without_set_args(), brackets: OnceCell::new() };
     let (mut lines, mut firsts) = (BTreeSet::new(), Vec::new());
     errors.sort_by_key(|error| error.span.start);
     // The opening brackets of unclosed lists, indexed by line.
@@ -41,8 +41,8 @@ pub(super) fn report_errors_and_collect_broken_lines(
     }
     // The parser does not report an unclosed list at the end of the file. Skip this check if lists are nested
     // too deeply, because the list may be closed after all.
-    if let Some(open) =
-        last_unclosed_bracket(context.file_text()).filter(|_| !firsts.iter().any(is_nesting_limit_error))
+    if let Some(open) = last_unclosed_bracket(context.text_without_set_args())
+        .filter(|_| !firsts.iter().any(is_nesting_limit_error))
     {
         lines.insert(context.line_number_at_offset(open));
         opened.insert(context.line_number_at_offset(open), open);
@@ -122,9 +122,9 @@ fn last_unclosed_bracket(text: &str) -> Option<usize> {
 /// numbers on one line.
 fn unclosed_list_help(context: &FileContext<'_>, open: usize) -> String {
     let end = context
-        .span_text(&(open..context.file_text().len()))
+        .span_text(&(open..context.text_without_set_args().len()))
         .find('\n')
-        .map_or(context.file_text().len(), |at| open + at);
+        .map_or(context.text_without_set_args().len(), |at| open + at);
     match reformat_number_list(context.span_text(&(open + 1..end))) {
         Some(list) => format!("write {list}"),
         None => "expected `]`".to_owned(),

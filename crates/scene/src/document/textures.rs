@@ -172,9 +172,9 @@ fn read_mapping(table: &TableReader<'_>) -> TextureMapping {
 
 /// Reads `repeat`, `rotate`, `offset` and `uv`.
 fn read_mapping_keys(table: &TableReader<'_>) -> (Vec2, f64, Vec2, UvSet) {
-    let repeat = table.key("repeat").read_or_default(KeyInTable::pair);
+    let repeat = table.key("repeat").read_or_default(KeyInTable::number_pair);
     let rotate = table.key("rotate").read_or_default(KeyInTable::number);
-    let offset = table.key("offset").read_or_default(KeyInTable::pair);
+    let offset = table.key("offset").read_or_default(KeyInTable::number_pair);
     let uv = table.key("uv").integer();
     (repeat, rotate, offset, if uv == Some(1) { UvSet::Second } else { UvSet::First })
 }

@@ -22,7 +22,7 @@ pub struct SceneDocumentBuilder {
     /// The files of which the source consists. Empty if it is a single file.
     pub(crate) files: Arc<[SourceFile]>,
     /// Meshes and images that exist only in memory, by the value of the key `file`.
-    pub(crate) generated: Arc<BTreeMap<String, GeneratedFile>>,
+    pub(crate) generated: Arc<BTreeMap<String, InMemoryFile>>,
     comments: Vec<Comment>,
     /// The current table.
     table: TableId,
@@ -32,7 +32,7 @@ pub struct SceneDocumentBuilder {
 
 /// A mesh or an image that an importer has generated. The extension of its name determines its format.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct GeneratedFile {
+pub struct InMemoryFile {
     /// The content of the file.
     pub bytes: Arc<[u8]>,
     /// BLAKE3 hash of the bytes.
@@ -124,12 +124,12 @@ impl SceneDocumentBuilder {
     }
 
     /// Adds a file that exists only in memory. The key `file` refers to it by `name`.
-    pub fn add_generated_file(&mut self, name: String, file: GeneratedFile) {
+    pub fn add_in_memory_file(&mut self, name: String, file: InMemoryFile) {
         Arc::make_mut(&mut self.generated).insert(name, file);
     }
 
     /// The files that exist only in memory, by name.
-    pub fn generated_files(&self) -> &Arc<BTreeMap<String, GeneratedFile>> {
+    pub fn in_memory_files(&self) -> &Arc<BTreeMap<String, InMemoryFile>> {
         &self.generated
     }
 

@@ -25,7 +25,7 @@ pub fn shade_first_hit_aov(
     radiance: &mut [Vec3],
     counters: &mut RayCounters,
 ) -> Result<(), Canceled> {
-    tile.closest_hits(&scratch.rays, &mut scratch.hits)?;
+    tile.closest_hits_of_queue(&scratch.rays, &mut scratch.hits)?;
     for (path, hit) in scratch.rays.iter().zip(&scratch.hits) {
         let Some(hit) = hit else { continue };
         let Some((path, hit)) = first_opaque_hit(tile, path, hit, counters) else { continue };

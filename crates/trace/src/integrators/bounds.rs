@@ -43,7 +43,7 @@ pub fn draw_box_edges(
     let render = &tile.settings.render;
     let footprint = tile.world.camera.pixel_footprint(render.height);
     let brightness = exp2(-render.exposure);
-    tile.closest_hits(&scratch.rays, &mut scratch.hits)?;
+    tile.closest_hits_of_queue(&scratch.rays, &mut scratch.hits)?;
     for (path, hit) in scratch.rays.iter().zip(&scratch.hits) {
         let end = hit.map_or(f32::INFINITY, |hit| hit.shape.t);
         if let Some(NearbyBoxEdge { is_behind, depth }) = find_edge_to_draw(tile, &path.ray, end, footprint) {

@@ -71,7 +71,7 @@ pub fn trace_camera_paths(
     if let Some(fractions) = paths.accumulator.diffuse_fractions() {
         fractions.begin_camera_paths(slots.len());
     }
-    paths.begin_bounce(slots.len());
+    paths.prepare_bounce(slots.len());
     for start in slots.clone().step_by(CAMERA_ROWS * PACKET_SIZE) {
         tile.fill_camera_packets(start..slots.end, camera);
         for (first, row) in (start..).step_by(PACKET_SIZE).zip(&*camera) {
@@ -81,15 +81,15 @@ pub fn trace_camera_paths(
         }
     }
     paths.shade_queued_vertices()?;
-    paths.direct.accumulate_arrived_light_from_slot(slots.start, &mut paths.accumulator);
-    paths.start_next_bounce(rays);
+    paths.direct.accumulate_in_consecutive_slots(slots.start, &mut paths.accumulator);
+    paths.advance_to_next_bounce(rays);
     // Trace the remaining bounces.
     while !rays.is_empty() {
-        paths.begin_bounce(rays.len());
+        paths.prepare_bounce(rays.len());
         if tile.behavior.scatters {
             // Find all hits first, to group the rays by the object that they hit.
-            tile.closest_hits(rays, hits)?;
-            object_order.sort(hits);
+            tile.closest_hits_of_queue(rays, hits)?;
+            object_order.group_hits_by_object(hits);
             for places in object_order.grouped_queue_indices().chunks(PACKET_SIZE) {
                 paths.intersect_and_queue_packet(PacketSource::Traced(rays, hits, places))?;
             }
@@ -100,7 +100,7 @@ pub fn trace_camera_paths(
         }
         paths.shade_queued_vertices()?;
         paths.direct.accumulate_arrived_light(rays, &mut paths.accumulator);
-        paths.start_next_bounce(rays);
+        paths.advance_to_next_bounce(rays);
     }
     Ok(())
 }
@@ -148,7 +148,7 @@ impl CameraPathWavefront<'_, '_> {
         }
         if are_lit {
             self.direct.commit_spare_vertices();
-            self.store_cones(&rays, &packet);
+            self.store_plain_surface_cones(&rays, &packet);
         }
         // Add the emission found by camera rays, which needs no MIS weights.
         let (plain, escaped) = self.emitting_and_escaped_masks(&rays, &packet);
@@ -183,16 +183,16 @@ impl CameraPathWavefront<'_, '_> {
             self.direct.sample_group_lights(vertices.clone(), tile, aov, shares_with_paths)?;
             for (index, number) in vertices.clone().enumerate() {
                 let packet = (index, number);
-                let light = self.direct.complete_reflected_light(packet, tile, aov, shares_with_paths);
+                let light = self.direct.add_lobe_ray_light(packet, tile, aov, shares_with_paths);
                 light.rays.add_to(self.counters);
                 // Gather photons.
                 if let Some(maps) = self.maps {
                     let row = self.direct.batch_at_index(number);
                     let splits_lobes = self.direct.splits_lobes(row);
                     let gathered = gather_photons(tile, row, maps, depth, (aov, splits_lobes));
-                    self.direct.add_reflected_light(packet, &gathered, splits_lobes);
+                    self.direct.add_to_packet_sums(packet, &gathered, splits_lobes);
                 }
-                self.direct.accumulate_reflected_light(packet, aov);
+                self.direct.add_packet_light_to_paths(packet, aov);
             }
             // Sample BSDFs, with Russian roulette.
             for number in vertices {
@@ -230,7 +230,7 @@ impl CameraPathWavefront<'_, '_> {
     }
 
     /// Begins a bounce of `paths` paths.
-    fn begin_bounce(&mut self, paths: usize) {
+    fn prepare_bounce(&mut self, paths: usize) {
         let policy = || BounceContinuationRules::new(self.tile, self.depth, LobesToSample::All);
         self.continuation = self.tile.behavior.scatters.then(policy);
         let has_fractions = self.accumulator.diffuse_fractions().is_some();
@@ -238,11 +238,11 @@ impl CameraPathWavefront<'_, '_> {
     }
 
     /// Starts the next bounce with the rays generated in this bounce, reusing the old queue for output.
-    fn start_next_bounce(&mut self, rays: &mut Vec<PathRay>) {
+    fn advance_to_next_bounce(&mut self, rays: &mut Vec<PathRay>) {
         std::mem::swap(rays, self.next);
         self.next.clear();
         if let Some(fractions) = self.accumulator.diffuse_fractions() {
-            fractions.start_next_bounce();
+            fractions.advance_to_next_bounce();
         }
         self.depth += 1;
     }

@@ -125,7 +125,7 @@ impl RenderSettings {
 impl Fingerprinted for RenderSettings {
     fn add_to_fingerprint(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         let Self { render, dof, view, photons, layers } = self.without_ineffective_settings();
-        key.add(&render, of).add_bool(dof).add_choice_name(view.view_to_sample());
+        key.add_with_references(&render, of).add_bool(dof).add_choice_name(view.view_to_sample());
         // All acceleration structures return the same hits, but these two views show the structures
         // themselves.
         match view.aov_source() {

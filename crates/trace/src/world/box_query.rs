@@ -8,7 +8,7 @@ impl Geometry {
     /// all objects were visited.
     pub fn visit_objects_in_box(&self, bounds: &Aabb, mut visit: impl FnMut(u32, &Object) -> bool) -> bool {
         let mut continues = self.unbounded().iter().all(|&id| visit(id, &self.objects()[id as usize]));
-        self.tree()
+        self.finite_object_tree()
             .visit_overlapping(bounds, |id| continues = continues && visit(id, &self.objects()[id as usize]));
         continues
     }

@@ -9,7 +9,7 @@ use arrayvec::ArrayVec;
 
 use super::isolated::triangle_overlaps_box;
 use super::{Geometry, Hit, MeshInstance, Object, World};
-use crate::accel::PrimitiveOrEnclosingSubtree;
+use crate::accel::PrimitiveOrSubtreeAroundBox;
 use crate::geometry::ray::offset_origin;
 use crate::geometry::{Aabb, Ray, Shape, ShapeHit, SurfacePoint, SurfaceRequest};
 use crate::math::{DVec3, Vec3};
@@ -89,7 +89,7 @@ struct CoincidenceTestSegment {
 
 impl CoincidenceTestSegment {
     /// Value of t at `close` along the segment.
-    fn near_point_t(&self) -> f32 {
+    fn close_point_t(&self) -> f32 {
         let way = self.sides.segment_from_before_to_beyond().direction;
         (self.close - self.sides.before).dot(way) / way.length_squared()
     }
@@ -173,7 +173,7 @@ impl World {
             beyond: offset_origin(point, error, normal, -normal),
         };
         let probe = CoincidenceTestSegment { sides, close: offset_origin(point, error, normal, normal) };
-        let lead_end = probe.near_point_t();
+        let lead_end = probe.close_point_t();
         let mut is_led = false;
         let mut found = |near: CoincidentOrEnclosingSurface| {
             is_led |= match near {
@@ -189,7 +189,7 @@ impl World {
                 let inside = shape.encloses_points_if_closed(points);
                 closed_lead |= inside.is_some_and(|[before, close, _]| before != close);
                 let is_around = inside.map(|[_, _, beyond]| beyond);
-                self.shape_if_coincident_or_enclosing(shape, id, (&sides, is_around))
+                self.test_shape_at_offset_points(shape, id, (&sides, is_around))
                     .into_iter()
                     .for_each(&mut found);
             }
@@ -209,7 +209,7 @@ impl World {
 
     /// Returns the shape if its surface is between the points, or if it is glass and encloses
     /// [`OffsetPoints::beyond`]. `is_around` is `None` for open shapes.
-    fn shape_if_coincident_or_enclosing(
+    fn test_shape_at_offset_points(
         &self,
         shape: &Shape,
         object: u32,
@@ -280,7 +280,7 @@ impl World {
             let material = self.material_index(&Hit { shape: ShapeHit::from_t(0.0), object: id }) as u32;
             self.is_closed_shape(id) && self.is_glass_material(material)
         };
-        self.geometry.tree().n_highest_ids_by_subtree(is_glass).into()
+        self.geometry.finite_object_tree().n_highest_ids_by_subtree(is_glass).into()
     }
 
     /// Whether an object is a closed shape that contains a point.
@@ -337,10 +337,10 @@ impl Geometry {
         let point = at.surface.point;
         let near = Aabb { min: point, max: point }.expanded(self.coincidence_margin(at));
         objects.extend(self.unbounded());
-        self.tree().visit_surfaces_overlapping_box(&near, |met| {
+        self.finite_object_tree().visit_surfaces_overlapping_box(&near, |met| {
             match met {
-                PrimitiveOrEnclosingSubtree::Primitive(id) => objects.push(id),
-                PrimitiveOrEnclosingSubtree::Enclosing(subtree) => {
+                PrimitiveOrSubtreeAroundBox::Primitive(id) => objects.push(id),
+                PrimitiveOrSubtreeAroundBox::Enclosing(subtree) => {
                     objects.extend(enclosing.get(subtree).into_iter().flatten());
                 }
             }

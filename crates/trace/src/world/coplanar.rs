@@ -110,7 +110,7 @@ impl FlatFace {
 }
 
 /// Emissive faces, sorted by minimum x.
-pub(super) struct SortedEmissiveFaces {
+pub(super) struct EmissiveFacesByMinX {
     pub(super) faces: Vec<FlatFace>,
     bounds: Vec<[DVec3; 2]>,
     /// Maximum extent along x.
@@ -121,7 +121,7 @@ pub(super) struct SortedEmissiveFaces {
     margin: f64,
 }
 
-impl SortedEmissiveFaces {
+impl EmissiveFacesByMinX {
     /// Sorts the faces. Returns `None` if there are no faces.
     pub(super) fn new(mut faces: Vec<FlatFace>) -> Option<Self> {
         let min_x = |face: &FlatFace| face.bounds().map_or(f64::NEG_INFINITY, |[min, _]| min.x);
@@ -165,13 +165,13 @@ impl SortedEmissiveFaces {
 pub fn find_coplanar_lights(scene: &Scene, meshes: &[&LoadedMesh], origin: DVec3) -> Vec<CoplanarLight> {
     let mut faces = Vec::new();
     for object in (0..scene.objects.len()).filter(|object| can_object_emit(scene, meshes, *object)) {
-        visit_flat_faces(scene, meshes, (object, origin), None, |face| {
+        visit_flat_faces_of_object(scene, meshes, (object, origin), None, |face| {
             if face.emits.is_some() && !face.corners.is_empty() {
                 faces.push(face.clone());
             }
         });
     }
-    let Some(lights) = SortedEmissiveFaces::new(faces) else { return Vec::new() };
+    let Some(lights) = EmissiveFacesByMinX::new(faces) else { return Vec::new() };
     let mut found = BTreeMap::new();
     let mut pairs = 0;
     // Lights that touch glass are not moved because the handling of coincident glass surfaces resolves this
@@ -180,7 +180,7 @@ pub fn find_coplanar_lights(scene: &Scene, meshes: &[&LoadedMesh], origin: DVec3
         scene.objects[*object].material.is_some_and(|own| scene.materials[own].kind.is_solid_glass())
     };
     for object in (0..scene.objects.len()).filter(|object| !is_glass(object)) {
-        visit_flat_faces(scene, meshes, (object, origin), Some(&lights), |face| {
+        visit_flat_faces_of_object(scene, meshes, (object, origin), Some(&lights), |face| {
             if pairs > MAX_PAIRS {
                 return;
             }
@@ -292,11 +292,11 @@ fn can_object_emit(scene: &Scene, meshes: &[&LoadedMesh], object: usize) -> bool
 }
 
 /// Visits an object's flat faces. If `near` is given, skips mesh faces that are not near these lights.
-fn visit_flat_faces(
+fn visit_flat_faces_of_object(
     scene: &Scene,
     meshes: &[&LoadedMesh],
     (number, origin): (usize, DVec3),
-    near: Option<&SortedEmissiveFaces>,
+    near: Option<&EmissiveFacesByMinX>,
     mut visit: impl FnMut(&FlatFace),
 ) {
     let object = &scene.objects[number];
@@ -331,13 +331,15 @@ fn visit_flat_faces(
                 visit(face, emits);
             }
         }
-        Shape::Disk { center, normal, radius } => visit(polygon(octagon(center, normal, radius)), emits),
+        Shape::Disk { center, normal, radius } => {
+            visit(polygon(inscribed_octagon(center, normal, radius)), emits);
+        }
         Shape::Cylinder { a, b, radius, caps: true } => {
-            visit(polygon(octagon(a, a - b, radius)), emits);
-            visit(polygon(octagon(b, b - a, radius)), emits);
+            visit(polygon(inscribed_octagon(a, a - b, radius)), emits);
+            visit(polygon(inscribed_octagon(b, b - a, radius)), emits);
         }
         Shape::Cone { base, tip, radius, cap: true } => {
-            visit(polygon(octagon(base, base - tip, radius)), emits);
+            visit(polygon(inscribed_octagon(base, base - tip, radius)), emits);
         }
         Shape::Plane { point, normal } => {
             let normal = normal.normalize_or_zero();
@@ -383,7 +385,7 @@ fn visit_flat_faces(
 }
 
 /// An octagon inscribed in a circle, counterclockwise about the normal.
-fn octagon(center: DVec3, normal: DVec3, radius: f64) -> Vec<DVec3> {
+fn inscribed_octagon(center: DVec3, normal: DVec3, radius: f64) -> Vec<DVec3> {
     let (x, y) = normal.normalize_or(DVec3::Y).any_orthonormal_pair();
     let half = std::f64::consts::FRAC_1_SQRT_2;
     let turns = [(1.0, 0.0), (half, half), (0.0, 1.0), (-half, half)];

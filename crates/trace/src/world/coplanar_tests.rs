@@ -11,7 +11,7 @@ use crate::math::Vec3;
 use crate::math::origin::local_coordinate_origin;
 use crate::math::random::signed_number_generator as random;
 use crate::scene::description::Accel;
-use crate::world::packet::tests::assert_packets;
+use crate::world::packet::tests::assert_packets_match_rays;
 use crate::world::{Geometry, MeshTree, separate_coincident_emitters};
 
 /// A square mesh, centered at the origin and facing up.
@@ -127,7 +127,7 @@ fn lights_are_compared_only_with_nearby_faces() {
         FlatFace { emits: Some(EmissionSides::Front), ..FlatFace::new(corners.to_vec()).expect("a face") }
     };
     let all: Vec<FlatFace> = (0..2000).rev().map(light).collect();
-    let lights = SortedEmissiveFaces::new(all.clone()).expect("lights");
+    let lights = EmissiveFacesByMinX::new(all.clone()).expect("lights");
     let mut pairs = 0;
     for face in &all {
         let near: Vec<f64> =
@@ -352,7 +352,7 @@ fn packets_match_single_rays_at_lifted_lights() {
             let geometry = build_geometry_with_mesh(&scene_from_toml(&tables), accel, loaded)
                 .with_instruction_set(instructions);
             assert!(!geometry.coplanar_light_offsets().is_empty());
-            assert_packets(&geometry);
+            assert_packets_match_rays(&geometry);
         }
     }
 }

@@ -8,7 +8,7 @@ use std::borrow::Cow;
 use std::collections::{BTreeMap, HashMap};
 
 use super::coplanar::{
-    FlatFace, LIFT, MAX_PAIRS, ROUNDING, SURROUNDINGS, SortedEmissiveFaces, are_coplanar_and_overlap,
+    EmissiveFacesByMinX, FlatFace, LIFT, MAX_PAIRS, ROUNDING, SURROUNDINGS, are_coplanar_and_overlap,
 };
 use crate::assets::{FileMaterial, LoadedMesh};
 use crate::control::{CancelToken, Canceled};
@@ -53,7 +53,7 @@ pub fn separate_coincident_emitters(
     }
     let (lifts, height) = find_triangle_lifts(&mesh, emits, emits_in_file, token)?;
     if !lifts.is_empty() {
-        offset_along_normals(mesh.to_mut(), &lifts, height);
+        apply_triangle_lifts(mesh.to_mut(), &lifts, height);
     }
     Ok(match mesh {
         Cow::Borrowed(_) => None,
@@ -97,7 +97,7 @@ fn find_triangle_lifts(
     let all = 0..mesh.triangles.len() as u32;
     let (mut found, mut pairs, mut sizes) = (BTreeMap::new(), 0, 1.0);
     let emissive = all.clone().filter(|id| emits(*id)).filter_map(face).collect();
-    let Some(lights) = SortedEmissiveFaces::new(emissive) else { return Ok((found, 0.0)) };
+    let Some(lights) = EmissiveFacesByMinX::new(emissive) else { return Ok((found, 0.0)) };
     for (other, is_light) in all.filter_map(|id| Some((face(id)?, emits(id)))) {
         token.check_pause_and_cancel()?;
         if pairs > MAX_PAIRS {
@@ -122,7 +122,7 @@ fn find_triangle_lifts(
 
 /// Moves triangles by `height` along their normals in `lifts`. The moved triangles no longer share vertices
 /// with the others.
-fn offset_along_normals(mesh: &mut TriangleMesh, lifts: &BTreeMap<usize, DVec3>, height: f64) {
+fn apply_triangle_lifts(mesh: &mut TriangleMesh, lifts: &BTreeMap<usize, DVec3>, height: f64) {
     let mut known = HashMap::new();
     for (triangle, normal) in lifts {
         let direction = (*normal * 1e4).round().to_array().map(|part| part as i32);

@@ -221,7 +221,7 @@ impl SurfaceEmission {
 
 /// Scales light bounds by the mean of the terms that modulate the light.
 fn scale_light_bounds_by_term_means(bounds: LightBounds, terms: &[EmissionTerm]) -> LightBounds {
-    match terms.iter().any(EmissionTerm::varies) {
+    match terms.iter().any(EmissionTerm::varies_in_space_or_angle) {
         true => bounds.scaled_by(terms.iter().map(EmissionTerm::mean).sum()),
         false => bounds,
     }
@@ -303,7 +303,7 @@ fn mesh_lights_by_material_and_side(
                 };
                 UvMapping::Triangles(triangles_with_material(mesh, own).map(patch).collect())
             };
-            let is_varying = terms.iter().any(EmissionTerm::varies);
+            let is_varying = terms.iter().any(EmissionTerm::varies_in_space_or_angle);
             let modulation = is_varying.then(|| EmissionModulation::from_terms(terms, patches())).flatten();
             let modulation = modulation.map(|modulation| Box::new(modulation.with_object_frame(frame)));
             let (shape, part) = (Emitter::Mesh(emitter), EmittingPart::Listed);

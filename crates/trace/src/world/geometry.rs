@@ -149,7 +149,7 @@ impl Geometry {
     }
 
     /// The tree over all finite objects.
-    pub(super) fn tree(&self) -> &Bvh {
+    pub(super) fn finite_object_tree(&self) -> &Bvh {
         &self.tree
     }
 

@@ -9,7 +9,7 @@ use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU8, Ordering};
 
 use super::{Geometry, Hit, MeshInstance, Object};
-use crate::accel::PrimitiveOrEnclosingSubtree;
+use crate::accel::PrimitiveOrSubtreeAroundBox;
 use crate::geometry::{Aabb, Shape, SurfacePoint};
 use crate::math::{DVec3, Vec3};
 
@@ -192,7 +192,7 @@ impl Geometry {
         // neighbor.
         for parts in [least, 4.0 * least].into_iter().filter(|&parts| parts <= MAX_STATE) {
             let inner = smaller(own_corners, parts);
-            if !is_triangle_apart_from_rest_of_mesh(mesh, triangle, inner, apart * growth) {
+            if !is_far_from_other_triangles(mesh, triangle, inner, apart * growth) {
                 continue;
             }
             let inner = smaller(corners, parts);
@@ -219,10 +219,10 @@ impl Geometry {
             return false;
         }
         let mut is_clear = true;
-        self.tree().visit_surfaces_overlapping_box(around, |met| {
+        self.finite_object_tree().visit_surfaces_overlapping_box(around, |met| {
             is_clear = match met {
-                PrimitiveOrEnclosingSubtree::Primitive(id) => !is_near(id),
-                PrimitiveOrEnclosingSubtree::Enclosing(_) => false,
+                PrimitiveOrSubtreeAroundBox::Primitive(id) => !is_near(id),
+                PrimitiveOrSubtreeAroundBox::Enclosing(_) => false,
             };
             is_clear
         });
@@ -232,12 +232,7 @@ impl Geometry {
 
 /// Whether all other triangles of the mesh are at least `apart` from a part of one triangle, in mesh
 /// coordinates. This is checked first because most nearby triangles are neighbors in the same mesh.
-fn is_triangle_apart_from_rest_of_mesh(
-    mesh: &MeshInstance,
-    triangle: u32,
-    part: [DVec3; 3],
-    apart: f64,
-) -> bool {
+fn is_far_from_other_triangles(mesh: &MeshInstance, triangle: u32, part: [DVec3; 3], apart: f64) -> bool {
     let around = Aabb::from_points_f64(part).expanded(Vec3::splat((1.1 * apart) as f32));
     mesh.tree.triangle_tree().all_triangles_in_box_satisfy(&around, |other| {
         other == triangle || are_triangles_apart(part, mesh.local_corners(other), apart)

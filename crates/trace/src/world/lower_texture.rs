@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::textures::{TextureImageKey, file_texture_source, scene_material_texture_source};
+use super::textures::{TextureImageKey, file_texture_image_key, scene_material_image_key};
 use super::{Images, TexelsAndMipmaps};
 use crate::assets::FileTexture;
 use crate::materials::UvSet;
@@ -24,7 +24,7 @@ pub(super) fn lower_texture(
     let declared = &scene.textures[index];
     match &declared.content {
         TextureSource::Image(image) => {
-            let source = scene_material_texture_source(scene, material, (index, role), image);
+            let source = scene_material_image_key(scene, material, (index, role), image);
             Texture::Image(lower_image(declared, image, loaded_image_or_placeholder(images, &source), role))
         }
         TextureSource::Pattern { colors, pattern } => {
@@ -87,7 +87,7 @@ pub(super) fn lower_mesh_file_texture(
     texture: &FileTexture,
     used: PixelInterpretation,
 ) -> Option<Arc<Texture>> {
-    let texels = images.get(&file_texture_source(texture, used))?.texels.clone();
+    let texels = images.get(&file_texture_image_key(texture, used))?.texels.clone();
     let (base, gain) = texture.range;
     let factor = match used {
         PixelInterpretation::Color | PixelInterpretation::CutOut | PixelInterpretation::Number(_) => {

@@ -1,5 +1,5 @@
 //! Small meshes merged into one tree, so that a ray that crosses many of them traverses only one tree. If
-//! there are few triangles in total, packets test them using a [`TriangleList`] without a tree.
+//! there are few triangles in total, packets test them using a [`BruteForceTriangles`] without a tree.
 //!
 //! Triangles are transformed to world coordinates and rounded. [`contact`](super::contact) and
 //! [`Geometry::visit_nodes_along_ray`](super::Geometry::visit_nodes_along_ray) use the per-mesh trees. Hits
@@ -10,7 +10,7 @@ mod packets;
 use super::triangle_tree::TriangleTree;
 use super::{MeshInstance, Object};
 use crate::control::{CancelToken, Canceled};
-use crate::geometry::triangle_list::{self, TriangleList};
+use crate::geometry::triangle_list::{self, BruteForceTriangles};
 use crate::geometry::{Aabb, Ray, ShapeHit};
 use crate::math::Vec3;
 
@@ -45,7 +45,7 @@ pub struct MergedTriangle {
 pub struct MergedMeshes {
     tree: TriangleTree,
     /// The triangles that packets test without the tree, or `None` if there are too many.
-    facets: Option<TriangleList>,
+    facets: Option<BruteForceTriangles>,
     /// Triangles sorted by object, so that at equal distances the lowest object id wins.
     triangles: Vec<MergedTriangle>,
     /// Index of each object's first triangle, or [`MergedMeshes::NOT_HERE`] if the object is not merged.
@@ -91,7 +91,7 @@ impl MergedMeshes {
         let facets = if total > MAX_FACETS {
             None
         } else {
-            TriangleList::new(chosen.iter().flat_map(rounded).collect())
+            BruteForceTriangles::new(chosen.iter().flat_map(rounded).collect())
         };
         if total <= MAX_FACETS && facets.is_none() {
             return Ok(None);
@@ -164,7 +164,7 @@ impl MergedMeshes {
 
     /// Memory used by the tree and its tables, in bytes.
     pub fn memory_bytes(&self) -> usize {
-        let facets = self.facets.as_ref().map_or(0, TriangleList::memory_bytes);
+        let facets = self.facets.as_ref().map_or(0, BruteForceTriangles::memory_bytes);
         self.tree.memory_bytes() + facets + size_of_val(&*self.triangles) + size_of_val(&*self.first)
     }
 }

@@ -139,7 +139,7 @@ impl MeshInstance {
 
     /// UVs of a triangle's corners, in the order of [`MeshInstance::world_corners`].
     pub fn corner_uvs(&self, triangle: u32) -> [Vec2; 3] {
-        self.values_in_corner_order(triangle, self.all_vertex_uvs_in_set(UvSet::First)).unwrap_or([
+        self.values_at_world_corners(triangle, self.all_vertex_uvs_in_set(UvSet::First)).unwrap_or([
             Vec2::ZERO,
             Vec2::X,
             Vec2::Y,
@@ -148,12 +148,12 @@ impl MeshInstance {
 
     /// UVs of a triangle's corners in the second UV set, if there is one.
     pub fn second_set_corner_uvs(&self, triangle: u32) -> Option<[Vec2; 3]> {
-        self.values_in_corner_order(triangle, &self.tree.loaded_mesh().mesh.second_uvs)
+        self.values_at_world_corners(triangle, &self.tree.loaded_mesh().mesh.second_uvs)
     }
 
     /// Vertex values at a triangle's corners, in the order of [`MeshInstance::world_corners`], or `None` if
     /// `values` is empty.
-    fn values_in_corner_order(&self, triangle: u32, values: &[Vec2]) -> Option<[Vec2; 3]> {
+    fn values_at_world_corners(&self, triangle: u32, values: &[Vec2]) -> Option<[Vec2; 3]> {
         let corners = self.tree.loaded_mesh().mesh.triangles[triangle as usize];
         let [a, b, c] = corners.map(|vertex| values.get(vertex as usize).copied());
         let (a, b, c) = (a?, b?, c?);

@@ -52,8 +52,8 @@ pub use object::Object;
 pub use origin::choose_origin_near_camera_target;
 pub use packet_material::PacketShadingMaterial;
 pub use textures::{
-    HashableAlphaCutoff, NeededTexture, TextureImageKey, TextureRolesNeededByRender, environment_map_source,
-    scene_material_texture_source, textures_needed,
+    HashableAlphaCutoff, NeededTexture, TextureImageKey, TextureRolesNeededByRender,
+    environment_map_image_key, scene_material_image_key, textures_needed,
 };
 pub use unlit_glass::LightBoundingBoxes;
 

@@ -194,7 +194,7 @@ impl SimdKernel for ShadowTransmittanceKernel<'_> {
         let geometry: &Geometry = &world.geometry;
         let each_mesh =
             see_through.is_any_merged || traced & geometry.light_is_entire_merged_mesh_mask(sources) != 0;
-        let tree = if each_mesh { geometry.tree() } else { geometry.traced_tree() };
+        let tree = if each_mesh { geometry.finite_object_tree() } else { geometry.traced_tree() };
         if tree.has_shells() {
             for lane in set_bit_lanes(traced) {
                 let ray = Ray { t_max: ends[lane], ..rows.ray(lane) };

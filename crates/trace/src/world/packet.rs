@@ -330,7 +330,7 @@ pub(super) mod tests {
 
     /// A grid of spheres, boxes and quads, four instances of a triangle fan (one of them untransformed), and
     /// a floor.
-    fn geometry(accel: Accel) -> Geometry {
+    fn mixed_test_geometry(accel: Accel) -> Geometry {
         let mut mesh = TriangleMesh { positions: vec![Vec3::ZERO], ..TriangleMesh::default() };
         for i in 0..40_u32 {
             let angle = i as f32 * 0.157;
@@ -364,7 +364,7 @@ pub(super) mod tests {
     fn packet_hits_match_single_ray_hits() {
         for accel in [Accel::Bvh, Accel::BvhHigh, Accel::KdTree] {
             for instructions in InstructionSet::ALL {
-                assert_packets(&geometry(accel).with_instruction_set(instructions));
+                assert_packets_match_rays(&mixed_test_geometry(accel).with_instruction_set(instructions));
             }
         }
     }
@@ -375,7 +375,7 @@ pub(super) mod tests {
         let spheres = (0..200).map(|i| Object::Shape(Shape::Sphere(sphere(i))));
         let geometry = Geometry::build(spheres.collect(), &CancelToken::new()).expect("never canceled");
         assert!(geometry.traced_tree().has_shells());
-        assert_packets(&geometry);
+        assert_packets_match_rays(&geometry);
     }
 
     struct OccludedRayPacketKernel<'a> {
@@ -401,7 +401,7 @@ pub(super) mod tests {
     }
 
     /// Compares packets of random rays with single rays.
-    pub(in crate::world) fn assert_packets(geometry: &Geometry) {
+    pub(in crate::world) fn assert_packets_match_rays(geometry: &Geometry) {
         let mut next = random(3);
         let (mut hits, mut shadows) = (0, 0);
         for i in 0..3000 {

@@ -14,7 +14,7 @@ impl Geometry {
         mut visit: impl FnMut(&Ray, &NodeBoundsAndDepth, &RayBoxInterval) -> bool,
     ) {
         let mut below = Vec::new();
-        self.traced_tree().visit_nodes_along_ray(
+        self.traced_tree().visit_nodes_hit_by_ray(
             ray,
             |cell, stretch| visit(ray, cell, stretch),
             |id, depth| below.push((id, depth)),

@@ -70,7 +70,7 @@ impl NeededTexture {
     /// The image used as the environment map.
     pub fn for_environment(file: &Path) -> Self {
         Self {
-            source: environment_source_from_path(file),
+            source: environment_image_key_from_path(file),
             name: "environment".to_owned(),
             declared: None,
             mesh_file: None,
@@ -171,7 +171,7 @@ pub fn textures_needed(
         for (texture, role) in textures.filter(|(_, role)| lookups.includes_role(*role, is_delta)) {
             let Some(image) = scene.textures[texture].as_image() else { continue };
             add(NeededTexture {
-                source: scene_material_texture_source(scene, material, (texture, role), image),
+                source: scene_material_image_key(scene, material, (texture, role), image),
                 name: scene.textures[texture].name.clone(),
                 declared: Some(texture),
                 mesh_file: None,
@@ -190,7 +190,7 @@ pub fn textures_needed(
             let path = &texture.path;
             let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
             add(NeededTexture {
-                source: file_texture_source(texture, used),
+                source: file_texture_image_key(texture, used),
                 name,
                 declared: None,
                 mesh_file: Some(file),
@@ -217,8 +217,8 @@ fn texture_uses_mipmaps(scene: &Scene, texture: usize) -> bool {
 }
 
 /// The environment map's file, or `None` if there is no map or the map's color factor is black.
-pub fn environment_map_source(scene: &Scene) -> Option<TextureImageKey> {
-    environment_map_path(scene).map(environment_source_from_path)
+pub fn environment_map_image_key(scene: &Scene) -> Option<TextureImageKey> {
+    environment_map_path(scene).map(environment_image_key_from_path)
 }
 
 fn environment_map_path(scene: &Scene) -> Option<&Path> {
@@ -226,7 +226,7 @@ fn environment_map_path(scene: &Scene) -> Option<&Path> {
     Some(&environment.file.as_ref()?.value)
 }
 
-fn environment_source_from_path(file: &Path) -> TextureImageKey {
+fn environment_image_key_from_path(file: &Path) -> TextureImageKey {
     TextureImageKey { path: file.to_owned(), image: None, encoding: ColorEncoding::Color, coverage: None }
 }
 
@@ -246,13 +246,14 @@ fn used_material_and_mesh_file_flags(scene: &Scene) -> (Vec<bool>, Vec<bool>) {
 }
 
 /// Image file and encoding for a scene material's texture in this role. `image` is the texture's image.
-pub fn scene_material_texture_source(
+pub fn scene_material_image_key(
     scene: &Scene,
     material: &Material,
     (texture, role): (usize, TextureRole),
     image: &ImageSource,
 ) -> TextureImageKey {
-    let source = scene_texture_source(image, texture_pixel_interpretation(scene, material, (texture, role)));
+    let source =
+        scene_texture_image_key(image, texture_pixel_interpretation(scene, material, (texture, role)));
     match role {
         TextureRole::Opacity(_) => TextureImageKey {
             coverage: cutoff_for_mip_coverage(scene, texture, material.opacity.cutoff),
@@ -302,7 +303,7 @@ pub fn texture_pixel_interpretation(
             if is_cut_out { PixelInterpretation::CutOut } else { PixelInterpretation::Color }
         }
         PixelInterpretation::Number(ChannelSelector::Opacity)
-            if !uses_image_as_color(scene, material, texture) =>
+            if !material_uses_image_as_color(scene, material, texture) =>
         {
             PixelInterpretation::Number(ChannelSelector::Mask { of_any_color: false })
         }
@@ -311,7 +312,7 @@ pub fn texture_pixel_interpretation(
 }
 
 /// Whether the material also uses the texture's image for a color.
-fn uses_image_as_color(scene: &Scene, material: &Material, texture: usize) -> bool {
+fn material_uses_image_as_color(scene: &Scene, material: &Material, texture: usize) -> bool {
     let image =
         |texture: usize| scene.textures[texture].as_image().map(|image| (&image.file.value, image.image));
     material.own_textures_with_roles().into_iter().any(|(other, role)| {
@@ -329,7 +330,7 @@ fn have_same_image_and_mapping(scene: &Scene, a: usize, b: usize) -> bool {
 }
 
 /// Image file and encoding for a scene texture with this pixel interpretation.
-pub fn scene_texture_source(image: &ImageSource, used: PixelInterpretation) -> TextureImageKey {
+pub fn scene_texture_image_key(image: &ImageSource, used: PixelInterpretation) -> TextureImageKey {
     let encoding = match (image.encoding, used) {
         (TextureEncoding::Srgb, PixelInterpretation::Color | PixelInterpretation::Normal) => {
             ColorEncoding::Srgb
@@ -357,7 +358,7 @@ pub fn scene_texture_source(image: &ImageSource, used: PixelInterpretation) -> T
 }
 
 /// Returns the image file to load for a texture of a mesh file, and how to decode it for this use.
-pub fn file_texture_source(texture: &FileTexture, used: PixelInterpretation) -> TextureImageKey {
+pub fn file_texture_image_key(texture: &FileTexture, used: PixelInterpretation) -> TextureImageKey {
     let encoding = match used {
         PixelInterpretation::Color => ColorEncoding::Color,
         PixelInterpretation::CutOut => ColorEncoding::CutOut(ColorTransferFunction::Auto),

@@ -1,6 +1,6 @@
 //! Acceleration structure over triangles: a BVH or a kd-tree, with bit-identical hits.
 
-use crate::accel::wide_bvh::Quality;
+use crate::accel::wide_bvh::BuildQuality;
 use crate::accel::{F32x16, KdTree, NodeBoundsAndDepth, RayBoxInterval, WideBvh};
 use crate::control::{CancelToken, Canceled};
 use crate::geometry::{Aabb, Ray, ShapeHit};
@@ -26,7 +26,9 @@ impl TriangleTree {
     ) -> Result<Self, Canceled> {
         Ok(match accel {
             Accel::Bvh => Self::Boxes(WideBvh::build(count, corners, token)?),
-            Accel::BvhHigh => Self::Boxes(WideBvh::build_with_quality(Quality::High, count, corners, token)?),
+            Accel::BvhHigh => {
+                Self::Boxes(WideBvh::build_with_quality(BuildQuality::High, count, corners, token)?)
+            }
             Accel::KdTree => Self::Planes(KdTree::from_triangles(count, corners, token)?),
         })
     }
@@ -70,7 +72,7 @@ impl TriangleTree {
         visit: impl FnMut(&NodeBoundsAndDepth, &RayBoxInterval) -> bool,
     ) {
         match self {
-            Self::Boxes(tree) => tree.visit_nodes_along_ray(ray, visit),
+            Self::Boxes(tree) => tree.visit_nodes_hit_by_ray(ray, visit),
             Self::Planes(tree) => tree.visit_nodes_along_ray(ray, visit),
         }
     }

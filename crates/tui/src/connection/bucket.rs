@@ -20,7 +20,7 @@ impl TokenBucket {
     }
 
     /// Current number of tokens.
-    pub(super) fn tokens(&self, now: Instant) -> usize {
+    pub(super) fn available_tokens(&self, now: Instant) -> usize {
         self.tokens_at(now).max(0.0) as usize
     }
 
@@ -30,7 +30,7 @@ impl TokenBucket {
 
     /// Returns the time at which there will be enough tokens to send `bytes`.
     pub(super) fn available_at(&self, bytes: usize, now: Instant) -> Instant {
-        if self.tokens(now) >= bytes {
+        if self.available_tokens(now) >= bytes {
             return now;
         }
         // One extra byte to compensate for rounding.

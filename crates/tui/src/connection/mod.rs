@@ -121,7 +121,7 @@ impl TerminalFlowControl {
     pub(super) fn max_sendable_bytes(&mut self, now: Instant) -> usize {
         self.check_timeouts(now);
         let window = self.window_bytes().saturating_sub(self.in_flight);
-        let tokens = self.bucket.tokens(now);
+        let tokens = self.bucket.available_tokens(now);
         let room = match self.replies {
             ReplySupport::Answering if !self.is_multiplexed => window,
             ReplySupport::Answering => window.min(tokens),
@@ -173,7 +173,7 @@ impl TerminalFlowControl {
             if slice.question == question && slice.bytes <= MAX_WINDOW {
                 let round_trip = now.saturating_duration_since(slice.sent);
                 self.round_trips.add(round_trip, now);
-                self.record_round_trip(round_trip);
+                self.push_recent_round_trip(round_trip);
                 self.adjust_window(&slice, round_trip, now);
             }
         }
@@ -228,7 +228,7 @@ impl TerminalFlowControl {
         self.replies == ReplySupport::Answering && !self.is_multiplexed && 2 * quick > self.recent.len()
     }
 
-    fn record_round_trip(&mut self, round_trip: Duration) {
+    fn push_recent_round_trip(&mut self, round_trip: Duration) {
         if self.recent.len() == RECENT_SLICES {
             self.recent.pop_front();
         }

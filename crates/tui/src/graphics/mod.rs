@@ -105,7 +105,7 @@ impl TerminalImages {
         }
         self.shown = None;
         match self.protocol {
-            ImageProtocol::Kitty => self.pieces.push_back(self.wrap_for_tmux(kitty::delete_all_commands())),
+            ImageProtocol::Kitty => self.pieces.push_back(self.wrap_if_in_tmux(kitty::delete_all_commands())),
             ImageProtocol::Sixel | ImageProtocol::Iterm => {}
         }
         Some(shown)
@@ -163,7 +163,7 @@ impl TerminalImages {
         let last = bodies.len().saturating_sub(1);
         for (i, body) in bodies.into_iter().enumerate() {
             let piece =
-                if i == last { self.wrap_at_cell(wanted.cells, body) } else { self.wrap_for_tmux(body) };
+                if i == last { self.wrap_at_cell(wanted.cells, body) } else { self.wrap_if_in_tmux(body) };
             self.pieces.push_back(piece);
         }
         self.shown = Some(wanted);
@@ -175,7 +175,7 @@ impl TerminalImages {
         if self.is_wrapped {
             // tmux moves the real cursor only when it draws, so print a blank at that cell and move back.
             bytes.extend_from_slice(b"\x1b[0m ");
-            bytes.extend(self.wrap_for_tmux([b"\x1b[D".to_vec(), body].concat()));
+            bytes.extend(self.wrap_if_in_tmux([b"\x1b[D".to_vec(), body].concat()));
         } else {
             bytes.extend(body);
         }
@@ -183,7 +183,7 @@ impl TerminalImages {
         bytes
     }
 
-    fn wrap_for_tmux(&self, body: Vec<u8>) -> Vec<u8> {
+    fn wrap_if_in_tmux(&self, body: Vec<u8>) -> Vec<u8> {
         if self.is_wrapped { tmux_passthrough(&body) } else { body }
     }
 }

@@ -54,7 +54,7 @@ fn candidate_colors_for_run(
         return shades;
     };
     for span in model.spans {
-        let box_ = shared_color_range(wanted.clone(), *span);
+        let box_ = longest_shared_color_range(wanted.clone(), *span);
         add(TerminalColor::Rgb(box_.color_with_fewest_digits()));
         let index = nearest_256_color_index(box_.clamped_mean_color());
         let fixed = TerminalColor::Palette(index);
@@ -75,7 +75,7 @@ struct RunColorRange {
 
 /// Intersects the ranges of colors within `span` of each wanted color, stopping before the intersection
 /// becomes empty.
-fn shared_color_range(wanted: impl Iterator<Item = TerminalColor>, span: u8) -> RunColorRange {
+fn longest_shared_color_range(wanted: impl Iterator<Item = TerminalColor>, span: u8) -> RunColorRange {
     let mut common = RunColorRange { low: [0; 3], high: [255; 3], sum: [0; 3], count: 0 };
     for shade in wanted.take(MAX_CELLS) {
         let TerminalColor::Rgb(rgb) = shade else { break };

@@ -141,7 +141,7 @@ impl ForegroundParts {
     }
 
     /// Whether this glyph can show the two colors of a cell.
-    pub(super) fn can_show_colors(self, pair: [TerminalColor; 2]) -> bool {
+    pub(super) fn can_represent_color_pair(self, pair: [TerminalColor; 2]) -> bool {
         let [first, second] = self.part_layers();
         pair[0].is_allowed_in_layer(first)
             && pair[1].is_allowed_in_layer(second)

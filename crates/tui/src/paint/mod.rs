@@ -44,7 +44,7 @@ use self::preview_rows::FirstPreviewByteBudget;
 pub use self::rep_support::terminal_supports_rep;
 use self::screen::{CellRun, LimitedOutputSlice, ScreenModel};
 use self::stable_cells::FirstPreviewCells;
-use self::target_screen::{ScreenRegion, TargetScreen};
+use self::target_screen::{TargetScreen, TextOrPreviewRegion};
 use super::color::ColorDepth;
 
 /// Draws target screens incrementally.
@@ -129,11 +129,11 @@ impl Painter {
     /// Drawing of the preview starts with the rows that have waited longest, so every row gets drawn even if
     /// targets change faster than they can be drawn.
     pub fn set_target(&mut self, wanted: &Buffer, picture: Rect, fidelity: PreviewFidelity) {
-        self.set_target_with_extras(wanted, picture, fidelity, &LinksAndDelayedText::default());
+        self.set_target_with_links(wanted, picture, fidelity, &LinksAndDelayedText::default());
     }
 
     /// Like [`Painter::set_target`], but with hyperlinks and with text to be drawn after the preview.
-    pub fn set_target_with_extras(
+    pub fn set_target_with_links(
         &mut self,
         wanted: &Buffer,
         picture: Rect,
@@ -165,7 +165,7 @@ impl Painter {
     }
 
     fn queue_all_draw_steps(&mut self) {
-        let mut rows: Vec<u16> = self.wanted.rows_center_outward().collect();
+        let mut rows: Vec<u16> = self.wanted.preview_rows_center_outward().collect();
         rows.sort_by_key(|y| self.rows[usize::from(*y)].aim);
         let words = (0..self.wanted.rows).map(RowLayerToDraw::Text);
         let later = (self.wanted.later.top()..self.wanted.later.bottom().min(self.wanted.rows))
@@ -219,10 +219,10 @@ impl Painter {
             self.part = self.parts.next();
             let strokes = match self.part {
                 Some(RowLayerToDraw::Text(y)) => {
-                    words::plan_text_row(screen, &self.wanted, y, ScreenRegion::Text)
+                    words::plan_text_row(screen, &self.wanted, y, TextOrPreviewRegion::Text)
                 }
                 Some(RowLayerToDraw::DelayedText(y)) => {
-                    words::plan_text_row(screen, &self.wanted, y, ScreenRegion::DelayedText)
+                    words::plan_text_row(screen, &self.wanted, y, TextOrPreviewRegion::DelayedText)
                 }
                 Some(RowLayerToDraw::Preview(y))
                     if self.rows[usize::from(y)].is_done && !screen.is_row_damaged(y) =>
@@ -230,7 +230,7 @@ impl Painter {
                     Vec::new()
                 }
                 Some(RowLayerToDraw::Preview(y)) if self.wanted.uses_ascii_ramp() => {
-                    words::plan_text_row(screen, &self.wanted, y, ScreenRegion::Preview)
+                    words::plan_text_row(screen, &self.wanted, y, TextOrPreviewRegion::Preview)
                 }
                 Some(RowLayerToDraw::Preview(y)) => preview_rows::plan_preview_row(
                     screen,

@@ -85,7 +85,7 @@ pub(super) fn plan_preview_row(
         count: 1,
     };
     let strokes: Vec<CellRun> = row.ops.into_iter().map(stroke).collect();
-    if can_repeat { CellRun::merge_repeated_blanks(&strokes) } else { strokes }
+    if can_repeat { CellRun::replace_blanks_with_repeat(&strokes) } else { strokes }
 }
 
 fn wanted_and_shown_cell(
@@ -94,7 +94,7 @@ fn wanted_and_shown_cell(
     memory: &FirstPreviewCells,
     at: CellPosition,
 ) -> WantedAndShownCell {
-    let shown = match screen.content(at) {
+    let shown = match screen.content_at(at) {
         CellContent::Mosaic(mosaic) => Some(*mosaic),
         CellContent::Unknown | CellContent::Text(_) | CellContent::Covered => None,
     };

@@ -38,7 +38,7 @@ impl CellRun {
 
     /// Replaces runs of equal blanks with REP where this is shorter. Only blanks are repeated because some
     /// terminals support REP only for ASCII characters.
-    pub(super) fn merge_repeated_blanks(strokes: &[Self]) -> Vec<Self> {
+    pub(super) fn replace_blanks_with_repeat(strokes: &[Self]) -> Vec<Self> {
         let mut shorter: Vec<Self> = Vec::with_capacity(strokes.len());
         for run in strokes.chunk_by(Self::is_repeated_by) {
             let count = run.len() as u16;
@@ -98,7 +98,7 @@ impl ScreenModel {
         slice.bytes.extend_from_slice(b"\x1b[0m\x1b[2J\x1b[H");
     }
 
-    pub(super) fn content(&self, at: CellPosition) -> &CellContent {
+    pub(super) fn content_at(&self, at: CellPosition) -> &CellContent {
         &self.contents[self.index(at)]
     }
 

@@ -86,7 +86,7 @@ impl FirstPreviewCells {
             for x in wanted.picture.left()..wanted.picture.right() {
                 if let (true, CellContent::Mosaic(shown), Some(wanted)) = (
                     self.is_cell_unchanged_by_edit(CellPosition { x, y }),
-                    screen.content(CellPosition { x, y }),
+                    screen.content_at(CellPosition { x, y }),
                     wanted.preview_cell(x, y),
                 ) {
                     counts[usize::from(max_channel_difference_between_cells(*shown, wanted))] += 1;

@@ -22,7 +22,7 @@ pub(super) struct TargetScreen {
 
 /// Regions of the screen, in drawing order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum ScreenRegion {
+pub(super) enum TextOrPreviewRegion {
     Text,
     Preview,
     /// Text drawn after the preview.
@@ -41,7 +41,7 @@ impl TargetScreen {
         Self {
             columns,
             rows,
-            contents: cell_contents(buffer, depth),
+            contents: buffer_cell_contents(buffer, depth),
             picture,
             later: Rect::ZERO,
             fidelity,
@@ -96,12 +96,12 @@ impl TargetScreen {
     }
 
     /// The region that a cell belongs to.
-    pub(super) fn region_at(&self, x: u16, y: u16) -> ScreenRegion {
+    pub(super) fn region_at(&self, x: u16, y: u16) -> TextOrPreviewRegion {
         match () {
-            () if self.is_preview_cell(x, y) => ScreenRegion::Preview,
-            () if !self.later.contains((x, y).into()) => ScreenRegion::Text,
-            () if self.row(y)[usize::from(x)] == CellContent::BLANK => ScreenRegion::Text,
-            () => ScreenRegion::DelayedText,
+            () if self.is_preview_cell(x, y) => TextOrPreviewRegion::Preview,
+            () if !self.later.contains((x, y).into()) => TextOrPreviewRegion::Text,
+            () if self.row(y)[usize::from(x)] == CellContent::BLANK => TextOrPreviewRegion::Text,
+            () => TextOrPreviewRegion::DelayedText,
         }
     }
 
@@ -122,7 +122,7 @@ impl TargetScreen {
     }
 
     /// The rows of the preview, from the middle outward.
-    pub(super) fn rows_center_outward(&self) -> impl Iterator<Item = u16> + use<> {
+    pub(super) fn preview_rows_center_outward(&self) -> impl Iterator<Item = u16> + use<> {
         let (top, bottom) = (self.picture.top(), self.picture.bottom());
         let middle = top + (bottom - top) / 2;
         (0..=bottom - top).flat_map(move |away| {
@@ -134,7 +134,7 @@ impl TargetScreen {
 }
 
 /// Contents of a buffer's cells.
-pub(super) fn cell_contents(buffer: &Buffer, depth: ColorDepth) -> Vec<CellContent> {
+pub(super) fn buffer_cell_contents(buffer: &Buffer, depth: ColorDepth) -> Vec<CellContent> {
     let columns = usize::from(buffer.area.width.max(1));
     let mut contents: Vec<CellContent> =
         buffer.content.iter().map(|cell| CellContent::from_cell(cell, depth)).collect();

@@ -6,7 +6,7 @@ use ratatui::layout::Rect;
 use ratatui::style::{Color, Modifier};
 
 use super::cell::CellContent;
-use super::target_screen::cell_contents;
+use super::target_screen::buffer_cell_contents;
 use super::terminal_color::TerminalColor;
 use super::*;
 
@@ -51,7 +51,7 @@ impl TestTerminal {
     /// differs.
     fn difference(&self, wanted: &Buffer, depth: ColorDepth) -> u32 {
         let mut largest = 0;
-        let contents = cell_contents(wanted, depth);
+        let contents = buffer_cell_contents(wanted, depth);
         for (i, look) in contents.iter().enumerate() {
             let (x, y) = (i as u16 % wanted.area.width, i as u16 / wanted.area.width);
             let cell = self.terminal.screen().cell(y, x).expect("a cell");
@@ -352,7 +352,7 @@ fn delayed_text_is_drawn_after_the_preview() {
         [LinksAndDelayedText { later, ..LinksAndDelayedText::default() }, LinksAndDelayedText::default()]
     {
         let mut test = TestTerminal::new(COLUMNS, ROWS, ColorDepth::TrueColor);
-        test.painter.set_target_with_extras(&buffer, PICTURE, PreviewFidelity::Still, &extras);
+        test.painter.set_target_with_links(&buffer, PICTURE, PreviewFidelity::Still, &extras);
         let mut cells_before = None;
         while test.slice(60) {
             let text = test.terminal.screen().contents();
@@ -382,7 +382,7 @@ fn hyperlink_covers_only_its_cells() {
     };
     let mut painter = Painter::new(ColorDepth::TrueColor);
     let mut sent = |extras: &LinksAndDelayedText| {
-        painter.set_target_with_extras(&buffer, PICTURE, PreviewFidelity::Still, extras);
+        painter.set_target_with_links(&buffer, PICTURE, PreviewFidelity::Still, extras);
         let mut bytes = Vec::new();
         loop {
             let slice = painter.next_slice(100);

@@ -3,7 +3,7 @@
 use super::cell::{CellContent, ForegroundParts};
 use super::cursor_moves::{self, CellPosition};
 use super::screen::{CellRun, ScreenModel};
-use super::target_screen::{ScreenRegion, TargetScreen};
+use super::target_screen::{TargetScreen, TextOrPreviewRegion};
 
 /// Minimum length of a run of blanks that is erased with one sequence.
 const MIN_ERASED_RUN: usize = 9;
@@ -16,13 +16,13 @@ pub(super) fn plan_text_row(
     screen: &ScreenModel,
     wanted: &TargetScreen,
     y: u16,
-    region: ScreenRegion,
+    region: TextOrPreviewRegion,
 ) -> Vec<CellRun> {
     let mut strokes = Vec::new();
     for x in 0..wanted.columns {
         let at = CellPosition { x, y };
         let look = &wanted.row(y)[usize::from(x)];
-        if screen.content(at) == look || wanted.region_at(x, y) != region {
+        if screen.content_at(at) == look || wanted.region_at(x, y) != region {
             continue;
         }
         if let Some(stroke) = single_cell_run(at, look) {
@@ -37,7 +37,8 @@ fn single_cell_run(at: CellPosition, look: &CellContent) -> Option<CellRun> {
     match look {
         CellContent::Text(text) => Some(CellRun::Text { at, text: text.clone() }),
         CellContent::Mosaic(mosaic) => {
-            let glyph = ForegroundParts::ALL.into_iter().find(|glyph| glyph.can_show_colors(mosaic.pair))?;
+            let glyph =
+                ForegroundParts::ALL.into_iter().find(|glyph| glyph.can_represent_color_pair(mosaic.pair))?;
             Some(CellRun::Mosaic { at, glyph, mosaic: *mosaic, count: 1 })
         }
         CellContent::Unknown | CellContent::Covered => None,
@@ -52,7 +53,7 @@ fn bridge_gap(screen: &ScreenModel, strokes: &mut Vec<CellRun>, to: CellPosition
     let (mut between, mut bytes) = (Vec::new(), 0);
     for x in first..to.x {
         let at = CellPosition { x, ..to };
-        match screen.content(at) {
+        match screen.content_at(at) {
             CellContent::Text(other) if other.pen == text.pen && other.is_single_narrow_char() => {
                 bytes += other.symbol.len();
                 between.push(CellRun::Text { at, text: other.clone() });

@@ -12,10 +12,12 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 pub(super) use self::display::TerminalDisplayState;
-pub(super) use self::overlays::{BlockingErrors, Message, OverlayState, PaneState, ViewList};
-pub(super) use self::preview::ImageViewState;
+pub(super) use self::overlays::{BlockingErrors, Message, OverlayState, PaneState, ViewModeList};
+pub(super) use self::preview::DisplayedImageState;
 pub(super) use self::request::{CameraStepStatus, ImageProvenance, RequestState};
-pub(super) use self::saving::{SavedFilesState, SceneImageProgress, UndisplayedChange, WrittenFile};
+pub(super) use self::saving::{
+    SavedFilesState, SceneImageRenderProgress, UndisplayedChange, WrittenImageFile,
+};
 pub(super) use self::selection::{HeldMousePress, PickPurpose, PointerState};
 pub(super) use self::work::{AssetProgressBar, RenderState, RequestStatus, WorkState};
 use super::color::{AnsiColors, ColorDepth};
@@ -52,7 +54,7 @@ pub(super) struct State {
     pub request: RequestState,
     pub work: WorkState,
     pub display: TerminalDisplayState,
-    pub preview: ImageViewState,
+    pub preview: DisplayedImageState,
     pub saving: SavedFilesState,
     pub selection: PointerState,
     pub overlays: OverlayState,
@@ -72,7 +74,7 @@ impl State {
             display: TerminalDisplayState::new(&setup, now),
             request: RequestState::new(setup.scene, setup.overrides),
             work: WorkState::new(now),
-            preview: ImageViewState::default(),
+            preview: DisplayedImageState::default(),
             saving: SavedFilesState::new(),
             selection: PointerState::new(),
             overlays: OverlayState::default(),
@@ -99,7 +101,7 @@ impl State {
     /// Whether `w` may replace the output files: no known error or external change prevents it.
     pub(super) fn can_overwrite_outputs(&self) -> bool {
         let is_conflict = |found: &Diagnostic| found.severity == Severity::Error;
-        let is_kept = |written: &WrittenFile| written.lost.is_some_and(ExternalChange::is_kept);
+        let is_kept = |written: &WrittenImageFile| written.lost.is_some_and(ExternalChange::is_kept);
         !self.overlays.warnings.iter().any(is_conflict) && !self.saving.written.iter().any(is_kept)
     }
 
@@ -128,8 +130,8 @@ impl State {
     }
 
     /// Opens the view list, or restarts its timeout if it is already open.
-    pub(super) fn open_view_list(&mut self) {
-        self.overlays.open_view_list_or_restart_timeout(self.now);
+    pub(super) fn open_view_mode_list(&mut self) {
+        self.overlays.open_or_extend_view_mode_list(self.now);
         self.dirty = true;
     }
 

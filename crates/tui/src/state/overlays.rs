@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use crate::scene::diagnostic::Diagnostic;
-use crate::scene::is_file_not_found_diagnostic;
+use crate::scene::is_scene_not_found_diagnostic;
 
 /// Errors that prevent the preview from showing the current file.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -16,7 +16,7 @@ pub(crate) struct BlockingErrors {
 
 /// The open view list.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct ViewList {
+pub(crate) struct ViewModeList {
     /// Time when the list closes automatically.
     pub until: Instant,
     /// Search text typed after `/`, or `None` if not searching.
@@ -54,7 +54,7 @@ pub(crate) struct OverlayState {
     /// The pane that lists errors and warnings.
     pub diagnostics: PaneState,
     pub help: PaneState,
-    pub views: Option<ViewList>,
+    pub views: Option<ViewModeList>,
 }
 
 impl OverlayState {
@@ -62,13 +62,13 @@ impl OverlayState {
     pub(crate) fn is_scene_missing(&self) -> bool {
         self.problems
             .as_ref()
-            .is_some_and(|problems| problems.diagnostics.iter().any(is_file_not_found_diagnostic))
+            .is_some_and(|problems| problems.diagnostics.iter().any(is_scene_not_found_diagnostic))
     }
 
     /// Opens the view list, or restarts its timeout if it is already open.
-    pub(crate) fn open_view_list_or_restart_timeout(&mut self, now: Instant) {
+    pub(crate) fn open_or_extend_view_mode_list(&mut self, now: Instant) {
         const MOMENT: Duration = Duration::from_secs(4);
         let name = self.views.take().and_then(|views| views.name);
-        self.views = Some(ViewList { until: now + MOMENT, name });
+        self.views = Some(ViewModeList { until: now + MOMENT, name });
     }
 }

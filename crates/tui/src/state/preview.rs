@@ -5,7 +5,7 @@ use crate::pipeline::protocol::{NormalizedPosition, PreviewUpdate};
 
 /// The displayed image, and how it is shown.
 #[derive(Default)]
-pub(crate) struct ImageViewState {
+pub(crate) struct DisplayedImageState {
     pub shown: Option<PreviewUpdate>,
     pub history: RenderHistory,
     /// Center of the section shown at 1:1 scale, or `None` if the whole image is shown.

@@ -8,7 +8,7 @@ use super::{KeyboardOverrides, format_exposure_stops};
 use crate::math::DVec3;
 use crate::pipeline::FilePathAndContentId;
 use crate::pipeline::has_model_extension;
-use crate::pipeline::protocol::{MaxPreviewSize, NormalizedRect, ResolvedCamera};
+use crate::pipeline::protocol::{NormalizedRect, PreviewBounds, ResolvedCamera};
 use crate::pipeline::settings::{
     AdjustableSceneSettings, CameraOverrides, EffectiveSettingsSummary, Overrides, ViewMode,
 };
@@ -88,7 +88,7 @@ pub(crate) struct RequestState {
     /// Whether the newest request differs from the previous one only in exposure.
     pub is_exposure_only: bool,
     /// Preview size in the newest request.
-    pub preview_size: Option<MaxPreviewSize>,
+    pub preview_size: Option<PreviewBounds>,
     /// Time when a new preview size will be requested.
     pub resize_due: Option<Instant>,
     /// Section of the image to render first.
@@ -155,7 +155,7 @@ impl RequestState {
 
     /// Overrides from the command line combined with changes made with keys.
     pub(crate) fn combined_overrides(&self) -> Overrides {
-        self.toggles.add_to_command_line_overrides(&self.command_line)
+        self.toggles.merged_with_command_line(&self.command_line)
     }
 
     /// Overrides for the scene's own image, or `None` unless keys have changed the displayed image.
@@ -165,8 +165,11 @@ impl RequestState {
 
     /// Drops key changes that have been saved to the scene.
     pub(crate) fn drop_overrides_saved_to_scene(&mut self) {
-        let (shadows, integrator, photons) =
-            (self.shadows_without_toggles(), self.integrator_without_toggles(), self.base_photons_enabled());
+        let (shadows, integrator, photons) = (
+            self.shadows_without_toggles(),
+            self.integrator_without_toggles(),
+            self.photons_without_toggles(),
+        );
         let own = self.scene_camera();
         let exposure = self.command_line.exposure.or(self.own.map(|own| own.exposure));
         let KeyboardOverrides { camera, .. } = &mut self.toggles;
@@ -279,13 +282,13 @@ impl RequestState {
 
     /// Whether photons are enabled by the scene or the command line, or `None` until a valid scene has been
     /// read.
-    pub(crate) fn base_photons_enabled(&self) -> Option<bool> {
+    pub(crate) fn photons_without_toggles(&self) -> Option<bool> {
         self.command_line.photons.or(self.own.map(|own| own.photons))
     }
 
     /// Whether photons are currently enabled.
     pub(crate) fn are_photons_enabled(&self) -> bool {
-        self.toggles.photons.or(self.base_photons_enabled()).unwrap_or(false)
+        self.toggles.photons.or(self.photons_without_toggles()).unwrap_or(false)
     }
 
     /// Integrator set by the scene or the command line, or `None` until a valid scene has been read.

@@ -19,7 +19,7 @@ pub(crate) struct UndisplayedChange {
 
 /// Progress of the scene's own image, which is rendered from the saved scene with command-line overrides.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct SceneImageProgress {
+pub(crate) struct SceneImageRenderProgress {
     pub state: SavedSceneRenderStatus,
     /// Progress of the render, from 0 to 1.
     pub fraction: f64,
@@ -27,7 +27,7 @@ pub(crate) struct SceneImageProgress {
 
 /// A written image file.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct WrittenFile {
+pub(crate) struct WrittenImageFile {
     pub path: PathBuf,
     pub bytes: u64,
     /// Generation of the request that wrote the file.
@@ -44,7 +44,7 @@ pub(crate) struct WrittenFile {
     pub lost: Option<ExternalChange>,
 }
 
-impl WrittenFile {
+impl WrittenImageFile {
     /// The file's path, safe to display.
     pub(crate) fn escaped_path(&self) -> String {
         escape_invisible_chars(&self.path.to_string_lossy()).into_owned()
@@ -76,7 +76,7 @@ pub(crate) struct SavedFilesState {
     pub last_edit: Option<u64>,
     /// Generation number of the first request that used the most recently saved scene files.
     pub saved_at: u64,
-    pub own: SceneImageProgress,
+    pub own: SceneImageRenderProgress,
     /// Whether the scene's files are complete, meaning that no program is writing them.
     pub is_settled: bool,
     /// The last save, or `None` once its first changed cell is on the screen.
@@ -106,7 +106,7 @@ pub(crate) struct SavedFilesState {
     pub unwritten: Option<String>,
     /// The last write failure, until a later image is written.
     pub write_failed: Option<WriteFailure>,
-    pub written: Vec<WrittenFile>,
+    pub written: Vec<WrittenImageFile>,
     /// Number of handled events about written, failed, and refused images.
     pub write_results: u64,
 }
@@ -114,9 +114,9 @@ pub(crate) struct SavedFilesState {
 impl SavedFilesState {
     /// The file, if any, to which the user wrote an image that includes changes made with keys. The scene's
     /// own image does not replace it until the scene is saved or the user writes another image.
-    pub(crate) fn written_image_with_key_changes(&self) -> Option<&WrittenFile> {
-        let is_current = |written: &&WrittenFile| !written.is_stale && written.lost.is_none();
-        let is_newer = |written: &&WrittenFile| written.generation >= self.saved_at;
+    pub(crate) fn find_file_with_key_changes(&self) -> Option<&WrittenImageFile> {
+        let is_current = |written: &&WrittenImageFile| !written.is_stale && written.lost.is_none();
+        let is_newer = |written: &&WrittenImageFile| written.generation >= self.saved_at;
         self.written.iter().filter(is_current).filter(is_newer).find(|written| written.shows.is_some())
     }
 
@@ -130,7 +130,7 @@ impl SavedFilesState {
             edits: 0,
             last_edit: None,
             saved_at: 0,
-            own: SceneImageProgress { state: SavedSceneRenderStatus::NotBegun, fraction: 0.0 },
+            own: SceneImageRenderProgress { state: SavedSceneRenderStatus::NotBegun, fraction: 0.0 },
             is_settled: true,
             change: None,
             editor_closed: None,

@@ -6,7 +6,8 @@ use crate::event::{Event, PreviewSendReport};
 use crate::fixtures::*;
 use crate::messages;
 use crate::pipeline::protocol::{
-    self, CameraSaveResult, LastValidSceneRenderOutcome, PreviewUpdate, PreviewedImageState, Stage, Status,
+    self, CameraSaveResult, LastValidSceneRenderOutcome, PreviewUpdate, PreviewedImageState, Stage,
+    StageStatus,
 };
 use crate::pipeline::settings::EffectiveSettingsSummary;
 use crate::scene::diagnostic::{Diagnostic, Severity};
@@ -43,7 +44,7 @@ fn end(ui: &mut TestUi, unchanged: bool, seconds: f64, of_image: f64) {
     let mut event = done_event(generation, Vec::new(), unchanged);
     if let protocol::Event::Done { report, .. } = &mut event {
         let render = &mut report.stages[Stage::Render as usize];
-        render.status = if unchanged { Status::Reused } else { Status::Done };
+        render.status = if unchanged { StageStatus::Reused } else { StageStatus::Done };
         (render.seconds, report.image.render_seconds, report.seconds) = (seconds, of_image, seconds);
     }
     ui.worker_event(event);
@@ -112,7 +113,7 @@ fn editing_the_output_path_adds_no_entry() {
     let generation = ui.state.request.generation;
     let mut event = done_event(generation, Vec::new(), false);
     if let protocol::Event::Done { report, .. } = &mut event {
-        report.stages[Stage::Render as usize].status = Status::Reused;
+        report.stages[Stage::Render as usize].status = StageStatus::Reused;
     }
     ui.worker_event(event);
     let text = ui.screen_text();
@@ -447,7 +448,7 @@ fn status_line_items_are_separated() {
     ui.finish_render(BLUE);
     let settings = ui.state.request.effective.as_mut().expect("settings");
     (settings.width, settings.height) = (320, 180);
-    let reused = |name| stage_report(name, Status::Reused, 0.0, "");
+    let reused = |name| stage_report(name, StageStatus::Reused, 0.0, "");
     for name in [Stage::Parse, Stage::Meshes, Stage::Lights] {
         ui.state.work.stages[name as usize] = Some(reused(name));
     }

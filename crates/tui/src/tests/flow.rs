@@ -6,7 +6,7 @@ use super::{BLUE, RED, cells_of};
 use crate::event::{Effect, Event, KeyPress, RequiredEventSource, Signal};
 use crate::fixtures::*;
 use crate::messages;
-use crate::pipeline::protocol::{self, Command, Failure, MaxPreviewSize, PreviewUpdate, WriteRequirement};
+use crate::pipeline::protocol::{self, Command, Failure, PreviewBounds, PreviewUpdate, WriteRequirement};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::state::RequestStatus;
 use crate::{ContentChangeTime, ExitStatus};
@@ -16,7 +16,7 @@ fn first_request_includes_the_preview_size() {
     let mut state = state(80, 24);
     let effects = crate::update::request_first_render(&mut state);
     let request = sent_render_request(&effects).expect("a request");
-    assert_eq!(request.preview, Some(MaxPreviewSize { width: 56, height: 42, around: None }));
+    assert_eq!(request.preview, Some(PreviewBounds { width: 56, height: 42, around: None }));
     assert_eq!((request.generation, request.write, request.force), (1, WriteRequirement::Try, false));
 }
 
@@ -134,7 +134,7 @@ fn preview_is_resized_after_a_delay() {
     let effects = ui.advance_clock(50);
     assert!(matches!(
         effects[..],
-        [Effect::Send(Command::Preview(Some(MaxPreviewSize { width: 152, height: 114, around: None })))]
+        [Effect::Send(Command::Preview(Some(PreviewBounds { width: 152, height: 114, around: None })))]
     ));
     ui.handle_event(Event::Preview(PreviewUpdate {
         generation: 1,

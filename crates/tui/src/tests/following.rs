@@ -232,7 +232,7 @@ impl WatchedRender {
                 self.send_event(event);
             }
             for bytes in std::mem::take(&mut *self.outbox.borrow_mut()) {
-                self.presenter.display.record_written_bytes(bytes.len());
+                self.presenter.display.record_accepted_bytes(bytes.len());
                 self.terminal.send(bytes, now);
             }
             let wake = self.presenter.next_action_time(&self.ui.state, now);

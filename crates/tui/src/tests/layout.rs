@@ -7,7 +7,7 @@ use crate::event::{Effect, Event};
 use crate::fixtures::*;
 use crate::graphics::ImageProtocol;
 use crate::messages;
-use crate::pipeline::protocol::{self, Command, MaxPreviewSize, PreviewUpdate, Stage, Status};
+use crate::pipeline::protocol::{self, Command, PreviewBounds, PreviewUpdate, Stage, StageStatus};
 use crate::pipeline::settings::{EffectiveSettingsSummary, Overrides};
 use crate::preview_style::PreviewStyle;
 use crate::scene::diagnostic::Severity;
@@ -17,7 +17,7 @@ const WINDOWS: [(u16, u16); 3] = [(80, 24), (120, 40), (200, 60)];
 const SIZES: [(u32, u32); 4] = [(640, 480), (1280, 720), (640, 400), (512, 512)];
 
 /// Returns the preview size for an image, limited to the requested size.
-fn fitted_preview_size(size: (u32, u32), most: MaxPreviewSize) -> (u32, u32) {
+fn fitted_preview_size(size: (u32, u32), most: PreviewBounds) -> (u32, u32) {
     let scale = (f64::from(most.width) / f64::from(size.0)).min(f64::from(most.height) / f64::from(size.1));
     let side = |length: u32, most: u32| ((f64::from(length) * scale).round() as u32).clamp(1, most);
     (side(size.0, most.width), side(size.1, most.height))
@@ -87,7 +87,7 @@ fn layout_is_stable_during_a_render() {
             match step {
                 0 => ui.worker_event(protocol::Event::Stage {
                     generation,
-                    stage: stage_report(Stage::Textures, Status::Running, 0.0, ""),
+                    stage: stage_report(Stage::Textures, StageStatus::Running, 0.0, ""),
                 }),
                 1 => ui.worker_event(protocol::Event::Asset {
                     generation,
@@ -134,7 +134,7 @@ fn new_aspect_ratio_requests_another_preview() {
         own: scene_settings(),
     });
     assert!(
-        matches!(wide[..], [Effect::Send(Command::Preview(Some(MaxPreviewSize { width: 80, .. })))]),
+        matches!(wide[..], [Effect::Send(Command::Preview(Some(PreviewBounds { width: 80, .. })))]),
         "{wide:?}"
     );
 }
@@ -177,11 +177,11 @@ fn status_line_shows_progress_then_results() {
         generation: 1,
         stage: stage_report(name, status, seconds, ""),
     };
-    ui.worker_event(of(Stage::Textures, Status::Running, 0.0));
+    ui.worker_event(of(Stage::Textures, StageStatus::Running, 0.0));
     ui.worker_event(protocol::Event::Asset { generation: 1, progress: asset_progress("bricks", 1, 2) });
     assert!(under(&mut ui).starts_with("textures ━") && under(&mut ui).trim_end().ends_with("─ 0.0 s"));
-    ui.worker_event(of(Stage::Textures, Status::Done, 0.1));
-    ui.worker_event(of(Stage::Render, Status::Running, 0.0));
+    ui.worker_event(of(Stage::Textures, StageStatus::Done, 0.1));
+    ui.worker_event(of(Stage::Render, StageStatus::Running, 0.0));
     ui.worker_event(protocol::Event::Progress { generation: 1, progress: render_progress(0.5, None) });
     assert!(under(&mut ui).starts_with("render ━"), "{}", under(&mut ui));
     assert!(under(&mut ui).contains("─ 32/64 samples · 0.0 s"), "{}", under(&mut ui));
@@ -195,7 +195,7 @@ fn stage_times_are_compared_with_last_render() {
     let render = |ui: &mut TestUi, seconds| {
         let generation = ui.state.request.generation;
         ui.worker_event(protocol::Event::Started { generation });
-        let report = stage_report(Stage::Render, Status::Done, seconds, "");
+        let report = stage_report(Stage::Render, StageStatus::Done, seconds, "");
         ui.worker_event(protocol::Event::Stage { generation, stage: report });
     };
     render(&mut ui, 1.42);

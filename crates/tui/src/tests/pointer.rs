@@ -281,7 +281,7 @@ fn command_line_camera_overrides_the_file() {
     assert!(kept(&mut ui, true, false).is_empty());
     let text = ui.screen_text();
     assert!(
-        text.contains(&messages::saved_camera_overridden("scenes/cornell.toml"))
+        text.contains(&messages::camera_saved_but_overridden("scenes/cornell.toml"))
             && text.contains("reset camera"),
         "{text}"
     );

@@ -13,7 +13,9 @@ use crate::event::{Event, KeyPress};
 use crate::fixtures::*;
 use crate::keymap::KEYMAP;
 use crate::messages;
-use crate::pipeline::protocol::{self, Failure, PreviewUpdate, RenderProgress, Stage, StageReport, Status};
+use crate::pipeline::protocol::{
+    self, Failure, PreviewUpdate, RenderProgress, Stage, StageReport, StageStatus,
+};
 use crate::pipeline::settings::{Overrides, ViewMode};
 use crate::preview_style::PreviewStyle;
 use crate::scene::diagnostic::Severity;
@@ -110,10 +112,10 @@ fn wrongly_sized_image_is_not_shown() {
 fn table_shows_the_status_of_each_stage() {
     let mut ui = TestUi::new();
     for report in [
-        stage_report(Stage::Parse, Status::Done, 0.0004, ""),
-        stage_report(Stage::Meshes, Status::Reused, 0.0, ""),
-        stage_report(Stage::Photons, Status::Skipped, 0.0, "off"),
-        stage_report(Stage::Render, Status::Running, 0.0, ""),
+        stage_report(Stage::Parse, StageStatus::Done, 0.0004, ""),
+        stage_report(Stage::Meshes, StageStatus::Reused, 0.0, ""),
+        stage_report(Stage::Photons, StageStatus::Skipped, 0.0, "off"),
+        stage_report(Stage::Render, StageStatus::Running, 0.0, ""),
     ] {
         ui.worker_event(protocol::Event::Stage { generation: 1, stage: report });
     }
@@ -145,12 +147,12 @@ fn asset_bar_disappears_with_its_stage() {
     let of =
         |name, status| protocol::Event::Stage { generation: 1, stage: stage_report(name, status, 0.1, "") };
     let row = |ui: &mut TestUi, words: &str| ui.screen_text().lines().position(|line| line.contains(words));
-    ui.worker_event(of(Stage::Photons, Status::Running));
+    ui.worker_event(of(Stage::Photons, StageStatus::Running));
     let hint = row(&mut ui, "save cornell.toml");
     assert!(hint.is_some(), "{}", ui.screen_text());
     ui.worker_event(protocol::Event::Asset { generation: 1, progress: asset_progress("photons", 2, 2) });
     assert!(ui.screen_text().contains("━━━━━━━━ 100 %") && row(&mut ui, "save cornell.toml") == hint);
-    ui.worker_event(of(Stage::Photons, Status::Done));
+    ui.worker_event(of(Stage::Photons, StageStatus::Done));
     assert!(
         !ui.screen_text().contains("100 %") && row(&mut ui, "save cornell.toml") == hint,
         "{}",
@@ -243,7 +245,7 @@ fn stage_reasons_are_wrapped_between_words() {
     let mut ui = TestUi::new();
     let stage = |why: &str| StageReport {
         name: Stage::Meshes,
-        status: Status::Skipped,
+        status: StageStatus::Skipped,
         seconds: 0.0,
         processor_seconds: 0.0,
         why: why.to_owned(),
@@ -271,7 +273,7 @@ fn failed_stage_is_not_shown_as_running() {
     let mut ui = TestUi::new();
     let stage = StageReport {
         name: Stage::Parse,
-        status: Status::Running,
+        status: StageStatus::Running,
         seconds: 0.0,
         processor_seconds: 0.0,
         why: String::new(),
@@ -413,7 +415,7 @@ fn escape_sequences_in_names_are_harmless() {
     ui.worker_event(protocol::Event::Asset { generation: 1, progress: asset_progress(evil, 1, 2) });
     ui.worker_event(protocol::Event::Stage {
         generation: 1,
-        stage: stage_report(Stage::Parse, Status::Done, 0.1, evil),
+        stage: stage_report(Stage::Parse, StageStatus::Done, 0.1, evil),
     });
     ui.worker_event(written_event(1, evil, true));
     let harmless = |text: &str| {
@@ -632,7 +634,8 @@ fn time_differences_are_omitted_if_too_wide() {
     ui.finish_render(RED);
     ui.state.work.last_seconds[Stage::Render as usize] = Some(4.0);
     ui.press_character('r');
-    ui.state.work.stages[Stage::Render as usize] = Some(stage_report(Stage::Render, Status::Done, 0.35, ""));
+    ui.state.work.stages[Stage::Render as usize] =
+        Some(stage_report(Stage::Render, StageStatus::Done, 0.35, ""));
     assert!(ui.screen_text().contains("render    350 ms −3.65 s"), "{}", ui.screen_text());
     // The gap before the time is dropped first.
     ui.handle_event(Event::Resize(window(80, 24)));
@@ -648,7 +651,7 @@ fn preview_without_photons_is_marked() {
     ui.worker_event(protocol::Event::Started { generation: 1 });
     ui.worker_event(protocol::Event::Stage {
         generation: 1,
-        stage: stage_report(Stage::Photons, Status::Running, 0.0, ""),
+        stage: stage_report(Stage::Photons, StageStatus::Running, 0.0, ""),
     });
     assert!(!ui.screen_text().contains(messages::WITHOUT_PHOTONS), "no preview yet");
     let picture = |lacks_photons| {

@@ -90,7 +90,7 @@ fn finished_render_has_a_noise_curve() {
     assert!(!panel(&mut ui).contains(messages::NOISE_OVER_TIME), "the curve is hidden during a render");
     let mut event = done_event(generation, Vec::new(), false);
     if let protocol::Event::Done { report, .. } = &mut event {
-        report.stages[protocol::Stage::Render as usize].status = protocol::Status::Reused;
+        report.stages[protocol::Stage::Render as usize].status = protocol::StageStatus::Reused;
     }
     ui.worker_event(event);
     assert!(panel(&mut ui).contains(messages::NOISE_OVER_TIME), "{}", ui.screen_text());
@@ -103,7 +103,7 @@ fn finished_render_has_a_noise_curve() {
     ui.worker_event(protocol::Event::Started { generation });
     let mut event = done_event(generation, Vec::new(), false);
     if let protocol::Event::Done { report, .. } = &mut event {
-        report.stages[protocol::Stage::Render as usize].status = protocol::Status::Reused;
+        report.stages[protocol::Stage::Render as usize].status = protocol::StageStatus::Reused;
     }
     ui.worker_event(event);
     assert!(panel(&mut ui).contains(messages::NOISE_OVER_TIME), "{}", ui.screen_text());
@@ -306,7 +306,7 @@ fn unchanged_image_keeps_its_curve() {
     ui.worker_event(protocol::Event::Started { generation });
     let mut event = done_event(generation, Vec::new(), true);
     if let protocol::Event::Done { report, .. } = &mut event {
-        report.stages[protocol::Stage::Render as usize].status = protocol::Status::Reused;
+        report.stages[protocol::Stage::Render as usize].status = protocol::StageStatus::Reused;
     }
     ui.worker_event(event);
     assert!(ui.screen_text().contains("unchanged"), "{}", ui.screen_text());

@@ -8,7 +8,7 @@ use crate::event::{Event, KeyPress};
 use crate::exit_summary;
 use crate::fixtures::*;
 use crate::messages;
-use crate::pipeline::protocol::{self, CheckpointUpdate, PickedPixel, Stage, Status};
+use crate::pipeline::protocol::{self, CheckpointUpdate, PickedPixel, Stage, StageStatus};
 use crate::pipeline::settings::Overrides;
 use crate::preview_style::PreviewStyle;
 use crate::scene::diagnostic::Severity;
@@ -103,7 +103,7 @@ fn stage_reason_in_a_wide_panel_is_not_wrapped() {
     ui.press_character('r');
     let generation = ui.state.request.generation;
     ui.worker_event(protocol::Event::Started { generation });
-    let stage = stage_report(Stage::Meshes, Status::Skipped, 0.0, "unneeded");
+    let stage = stage_report(Stage::Meshes, StageStatus::Skipped, 0.0, "unneeded");
     ui.worker_event(protocol::Event::Stage { generation, stage });
     ui.handle_event(Event::Tick);
     assert!(ui.screen_text().contains("skipped  unneeded"), "{}", ui.screen_text());

@@ -7,7 +7,7 @@ use crate::exit_summary::summary_text;
 use crate::fixtures::*;
 use crate::messages;
 use crate::options::{ExternalChange, OutputChange};
-use crate::pipeline::protocol::{self, Command, SampleCounts, SavedSceneRenderStatus, Stage, Status};
+use crate::pipeline::protocol::{self, Command, SampleCounts, SavedSceneRenderStatus, Stage, StageStatus};
 use crate::scene::diagnostic::Severity;
 
 /// Creates a UI that has started to render the scene's own image.
@@ -31,7 +31,7 @@ fn finish_unwritten(ui: &mut TestUi, color: [u8; 3]) {
     let mut done = done_event(generation, ui.state.overlays.warnings.clone(), false);
     if let protocol::Event::Done { report, .. } = &mut done {
         (report.image.path, report.image.paths) = (None, Vec::new());
-        report.stages[Stage::Write as usize].status = Status::Skipped;
+        report.stages[Stage::Write as usize].status = StageStatus::Skipped;
     }
     ui.worker_event(done);
     ui.press_key(KeyPress::special(crossterm::event::KeyCode::Esc));
@@ -135,7 +135,7 @@ fn written_image_is_outdated_only_after_a_save() {
     ui.handle_event(Event::FileChanged(ContentChangeTime { noticed: ui.now }));
     own_image(&mut ui, SavedSceneRenderStatus::NotBegun);
     finish_unwritten(&mut ui, RED);
-    assert_shows(&mut ui, &messages::scene_image_outdated("cornell.png"));
+    assert_shows(&mut ui, &messages::scene_image_file_outdated("cornell.png"));
     assert!(!ui.screen_text().contains("written with"), "{}", ui.screen_text());
     assert!(summary_text(&ui.state).ends_with("(older than your last edit)"), "{}", summary_text(&ui.state));
 }

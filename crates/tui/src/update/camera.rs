@@ -179,7 +179,7 @@ pub(super) fn handle_camera_save_result(
     let words = match (is_new, is_own) {
         _ if of_model => messages::model_scene_written(&name),
         (true, true) => messages::camera_saved(&name),
-        (true, false) => messages::saved_camera_overridden(&name),
+        (true, false) => messages::camera_saved_but_overridden(&name),
         (false, _) => messages::camera_already_in_scene(&name),
     };
     let which = if state.saving.is_camera_of_newest { messages::OF_NEWEST_RENDER } else { "" };

@@ -9,8 +9,10 @@ use crate::pipeline::protocol::PreviewUpdate;
 use crate::state::{RenderState, State};
 
 /// Adds the current image to the history.
-pub(super) fn record_current_image(state: &mut State) {
-    if let Some(shown) = newest_image(state).filter(|shown| shown.generation == state.request.generation) {
+pub(super) fn record_newest_image(state: &mut State) {
+    if let Some(shown) =
+        clone_newest_image(state).filter(|shown| shown.generation == state.request.generation)
+    {
         let is_finished = state.work.rendering == RenderState::Finished || shown.shows_finished_image();
         let origin = state.request.image_provenance(!is_finished);
         state.preview.history.record_shown_image(shown, state.now, origin);
@@ -21,11 +23,11 @@ pub(super) fn record_current_image(state: &mut State) {
 /// arrives after the end of its render. A section shown at 1:1 scale never replaces a finished image.
 pub(super) fn record_newly_arrived_image(state: &mut State) {
     let is_over = !state.work.is_rendering();
-    if is_over && newest_image(state).is_some_and(|shown| shown.section.is_some()) {
+    if is_over && clone_newest_image(state).is_some_and(|shown| shown.section.is_some()) {
         return;
     }
     let (count, last) = (state.preview.history.len(), state.preview.history.last_image().cloned());
-    record_current_image(state);
+    record_newest_image(state);
     let history = &state.preview.history;
     let is_new = history.len() != count;
     let is_other = history.last_image().zip(last).is_some_and(|(now, before)| !Arc::ptr_eq(now, &before));
@@ -34,8 +36,8 @@ pub(super) fn record_newly_arrived_image(state: &mut State) {
 
 /// Moves back by `steps` renders, or forward if `steps` is negative.
 pub(super) fn browse_history(state: &mut State, steps: isize) -> Vec<Effect> {
-    record_current_image(state);
-    let Some(newest) = newest_image(state) else { return report_no_image(state) };
+    record_newest_image(state);
+    let Some(newest) = clone_newest_image(state) else { return report_no_image(state) };
     if state.preview.history.step_reaches_newest(steps) {
         return return_to_newest(state, messages::NEWEST_RENDER);
     }
@@ -49,8 +51,8 @@ pub(super) fn browse_history(state: &mut State, steps: isize) -> Vec<Effect> {
 
 /// Opens a render from the history strip.
 pub(super) fn open_entry_at_index(state: &mut State, at: usize) -> Vec<Effect> {
-    record_current_image(state);
-    let Some(newest) = newest_image(state) else { return Vec::new() };
+    record_newest_image(state);
+    let Some(newest) = clone_newest_image(state) else { return Vec::new() };
     if at + 1 >= state.preview.history.len() {
         return return_to_newest(state, messages::NEWEST_RENDER);
     }
@@ -65,8 +67,8 @@ pub(super) fn toggle_render_before_edit(state: &mut State) -> Vec<Effect> {
     if state.preview.history.is_viewing_older() {
         return return_to_newest(state, messages::AFTER_EDIT);
     }
-    record_current_image(state);
-    let Some(newest) = newest_image(state) else { return report_no_image(state) };
+    record_newest_image(state);
+    let Some(newest) = clone_newest_image(state) else { return report_no_image(state) };
     match state.preview.history.open_render_before_edit(newest) {
         Some(shown) => {
             let effects = show_history_render(state, shown);
@@ -94,7 +96,7 @@ fn report_no_image(state: &mut State) -> Vec<Effect> {
     show_notice_only(state, if is_shown { messages::NO_IMAGE } else { messages::NO_PREVIEW })
 }
 
-fn newest_image(state: &State) -> Option<PreviewUpdate> {
+fn clone_newest_image(state: &State) -> Option<PreviewUpdate> {
     if state.preview.history.is_viewing_older() {
         state.preview.history.newest_while_viewing_older()
     } else {

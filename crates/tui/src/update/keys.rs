@@ -151,7 +151,7 @@ fn toggle_photon_mapping(state: &mut State) -> Vec<Effect> {
     }
     let next = !state.request.are_photons_enabled();
     state.request.toggles.photons =
-        Some(next).filter(|next| is_different_from_base(next, state.request.base_photons_enabled()));
+        Some(next).filter(|next| is_different_from_base(next, state.request.photons_without_toggles()));
     request_render(state, false)
 }
 

@@ -25,7 +25,7 @@ use super::event::{Effect, Event, RequiredEventSource, Signal, WindowSize};
 use super::messages;
 use super::options::ContentChangeTime;
 use super::preview_style::PreviewStyle;
-use super::state::{Message, SceneImageProgress, State, UndisplayedChange};
+use super::state::{Message, SceneImageRenderProgress, State, UndisplayedChange};
 use super::view::layout::Layout;
 use crate::film::Srgb8Image;
 use crate::pipeline::protocol::{Command, PreviewUpdate, SavedSceneRenderStatus};
@@ -76,7 +76,7 @@ fn handle_event(state: &mut State, event: Event) -> Vec<Effect> {
             let (is_own, is_known) = (is_of(state.saving.camera_kept), is_of(state.saving.camera_refused));
             (state.saving.camera_kept, state.saving.camera_refused) = (None, None);
             state.saving.is_settled = false;
-            history::record_current_image(state);
+            history::record_newest_image(state);
             if !is_own && !is_known {
                 (state.overlays.message, state.selection.facts) = (None, None);
             }
@@ -86,7 +86,8 @@ fn handle_event(state: &mut State, event: Event) -> Vec<Effect> {
             state.saving.edits += 1;
             let effects = request_render(state, false);
             state.saving.saved_at = state.request.generation;
-            state.saving.own = SceneImageProgress { state: SavedSceneRenderStatus::NotBegun, fraction: 0.0 };
+            state.saving.own =
+                SceneImageRenderProgress { state: SavedSceneRenderStatus::NotBegun, fraction: 0.0 };
             state.saving.last_edit = (!is_own).then_some(state.request.generation);
             // A change saved in the editor becomes visible only when the editor exits.
             let noticed = state.saving.editor_closed.map_or(noticed, |back| noticed.max(back));

@@ -45,21 +45,24 @@ pub(super) fn handle_reply(state: &mut State, answer: TerminalReply) -> Vec<Effe
 }
 
 /// Whether the requested pixel protocol is supported, according to a reply.
-enum PixelSupport {
+enum RequestedProtocolSupport {
     Nothing,
     Has,
     Lacks,
 }
 
-fn requested_protocol_support(request: UnconfirmedImageProtocol, answer: TerminalReply) -> PixelSupport {
+fn requested_protocol_support(
+    request: UnconfirmedImageProtocol,
+    answer: TerminalReply,
+) -> RequestedProtocolSupport {
     match answer {
-        TerminalReply::Images(protocol) if protocol == request.protocol => PixelSupport::Has,
+        TerminalReply::Images(protocol) if protocol == request.protocol => RequestedProtocolSupport::Has,
         TerminalReply::Name(terminal)
             if request.protocol == ImageProtocol::Iterm && terminal.brand.has_iterm_images() =>
         {
-            PixelSupport::Has
+            RequestedProtocolSupport::Has
         }
-        TerminalReply::Attributes if request.is_attributes_reply_last() => PixelSupport::Lacks,
+        TerminalReply::Attributes if request.is_attributes_reply_last() => RequestedProtocolSupport::Lacks,
         TerminalReply::Images(_)
         | TerminalReply::Name(_)
         | TerminalReply::Attributes
@@ -69,7 +72,7 @@ fn requested_protocol_support(request: UnconfirmedImageProtocol, answer: Termina
         | TerminalReply::TrueColor
         | TerminalReply::Background(_)
         | TerminalReply::Ink { .. }
-        | TerminalReply::Other => PixelSupport::Nothing,
+        | TerminalReply::Other => RequestedProtocolSupport::Nothing,
     }
 }
 
@@ -77,12 +80,12 @@ fn requested_protocol_support(request: UnconfirmedImageProtocol, answer: Termina
 fn enable_pixels_if_supported(state: &mut State, answer: TerminalReply) -> Vec<Effect> {
     let Some(request) = state.display.pixels else { return Vec::new() };
     match requested_protocol_support(request, answer) {
-        PixelSupport::Nothing => Vec::new(),
-        PixelSupport::Lacks => {
+        RequestedProtocolSupport::Nothing => Vec::new(),
+        RequestedProtocolSupport::Lacks => {
             report_unsupported_graphics(state);
             Vec::new()
         }
-        PixelSupport::Has => {
+        RequestedProtocolSupport::Has => {
             (state.display.pixels, state.display.pixels_until) = (None, None);
             state.overlays.message.take_if(|message| message.words == request.unsupported_message());
             state.display.kind = PreviewStyle::Pixels(request.protocol);

@@ -13,7 +13,7 @@ pub(super) fn request_render(state: &mut State, force: bool) -> Vec<Effect> {
     if state.request.camera_step.generation == Some(state.request.generation) {
         state.preview.history.drop_unfinished_of_request(state.request.generation);
     } else {
-        history::record_current_image(state);
+        history::record_newest_image(state);
     }
     state.preview.shown = state.preview.history.return_to_newest().or_else(|| state.preview.shown.take());
     let before = std::mem::replace(&mut state.request.sent_toggles, state.request.toggles);

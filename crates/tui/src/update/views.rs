@@ -63,7 +63,7 @@ pub(super) fn handle_search_key(state: &mut State, key: KeyPress) -> Option<Vec<
 
 /// Selects a view and opens the list.
 pub(super) fn select_view_and_open_list(state: &mut State, view: ViewMode) -> Vec<Effect> {
-    state.open_view_list();
+    state.open_view_mode_list();
     state.request.toggles.view = (view != state.request.base_view_mode()).then_some(view);
     let effects = request_render(state, false);
     if state.request.toggles.view.is_some() {
@@ -87,7 +87,7 @@ fn find_view_by_partial_name(name: &str) -> Option<ViewMode> {
 }
 
 fn open_list_with_search_text(state: &mut State, name: String) {
-    state.open_view_list();
+    state.open_view_mode_list();
     if let Some(views) = &mut state.overlays.views {
         views.name = Some(name);
     }
@@ -100,7 +100,7 @@ fn close_view_list(state: &mut State) {
 
 /// Selects a view unless it is already selected.
 fn select_view_if_changed(state: &mut State, view: ViewMode) -> Vec<Effect> {
-    state.open_view_list();
+    state.open_view_mode_list();
     if view == state.request.view_mode() {
         return Vec::new();
     }

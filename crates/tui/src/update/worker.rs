@@ -13,11 +13,13 @@ use super::{camera, pointer};
 use crate::event::{Effect, WriteFailure};
 use crate::noise_curve::NoiseCurve;
 use crate::pipeline::protocol::{
-    AssetProgress, CheckpointUpdate, Event, SavedSceneRenderStatus, StageReport, Status,
+    AssetProgress, CheckpointUpdate, Event, SavedSceneRenderStatus, StageReport, StageStatus,
 };
 use crate::scene::MAX_COMPARED_BYTES;
 use crate::scene::sanitize::escape_invisible_chars;
-use crate::state::{AssetProgressBar, RenderState, RequestStatus, SceneImageProgress, State, WrittenFile};
+use crate::state::{
+    AssetProgressBar, RenderState, RequestStatus, SceneImageRenderProgress, State, WrittenImageFile,
+};
 use crate::{messages, window_title};
 use completion::{handle_done, handle_failure, handle_last_valid_render_end};
 
@@ -98,7 +100,7 @@ pub(super) fn handle_worker_event(state: &mut State, event: Event) -> Vec<Effect
             if !was_requested_by_user || state.work.activity == RequestStatus::Done {
                 state.saving.unwritten = Some(messages::NOT_WRITTEN.to_owned());
             }
-            let is_failed_file = |written: &&mut WrittenFile| Some(&written.path) == path.as_ref();
+            let is_failed_file = |written: &&mut WrittenImageFile| Some(&written.path) == path.as_ref();
             state
                 .saving
                 .written
@@ -214,7 +216,7 @@ fn generation_of_event(event: &Event) -> u64 {
 
 fn reset_work_for_new_request(state: &mut State) {
     for (before, stage) in state.work.last_seconds.iter_mut().zip(&state.work.stages) {
-        let done = stage.as_ref().filter(|stage| stage.status == Status::Done);
+        let done = stage.as_ref().filter(|stage| stage.status == StageStatus::Done);
         *before = done.map(|stage| stage.seconds).or(*before);
     }
     state.work.stages = Default::default();
@@ -226,8 +228,10 @@ fn reset_work_for_new_request(state: &mut State) {
     // A written image stays up to date until the render of another image begins.
     if state.request.has_no_keyboard_overrides() && state.saving.own.state != SavedSceneRenderStatus::Written
     {
-        state.saving.own =
-            SceneImageProgress { state: SavedSceneRenderStatus::Begun { is_rendering: true }, fraction: 0.0 };
+        state.saving.own = SceneImageRenderProgress {
+            state: SavedSceneRenderStatus::Begun { is_rendering: true },
+            fraction: 0.0,
+        };
     }
     close_empty_pane(state);
     state.work.unchanged = false;
@@ -235,7 +239,7 @@ fn reset_work_for_new_request(state: &mut State) {
 
 fn record_stage(state: &mut State, stage: StageReport) {
     // Progress bars disappear when their stage ends.
-    if stage.status != Status::Running {
+    if stage.status != StageStatus::Running {
         state.work.assets.clear();
     }
     if let Some(slot) = state.work.stages.get_mut(stage.name as usize) {

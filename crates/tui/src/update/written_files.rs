@@ -8,7 +8,7 @@ use crate::event::Effect;
 use crate::options::OutputChange;
 use crate::pipeline::protocol::{Report, SampleCounts, SavedSceneRenderStatus};
 use crate::scene::sanitize::escape_invisible_chars;
-use crate::state::{RequestStatus, SceneImageProgress, State, WrittenFile};
+use crate::state::{RequestStatus, SceneImageRenderProgress, State, WrittenImageFile};
 use crate::{exit_summary, messages};
 
 /// Reports the files written at the user's request.
@@ -50,7 +50,7 @@ pub(super) fn record_written_file(
     }
     let is_unfinished = unfinished.is_some();
     let (is_stale, lost) = (false, None);
-    state.saving.written.push(WrittenFile {
+    state.saving.written.push(WrittenImageFile {
         path,
         bytes,
         generation,
@@ -61,13 +61,13 @@ pub(super) fn record_written_file(
         lost,
     });
     if generation >= state.saving.saved_at && is_scene_image_written(state, generation) {
-        state.saving.own = SceneImageProgress { state: SavedSceneRenderStatus::Written, fraction: 1.0 };
+        state.saving.own = SceneImageRenderProgress { state: SavedSceneRenderStatus::Written, fraction: 1.0 };
     }
 }
 
 /// Whether this request has written the finished image, without keyboard changes, to all output files.
 fn is_scene_image_written(state: &State, generation: u64) -> bool {
-    let is_complete = |written: &WrittenFile| {
+    let is_complete = |written: &WrittenImageFile| {
         written.generation == generation && written.shows.is_none() && !written.is_unfinished
     };
     let is_written =
@@ -79,7 +79,8 @@ fn is_scene_image_written(state: &State, generation: u64) -> bool {
 /// Adds a description to the files that contain a finished request's image.
 pub(super) fn describe_files_of_request(state: &mut State, generation: u64, report: &Report) {
     let base = state.request.base_view_mode();
-    let has_image = |written: &&mut WrittenFile| written.generation == generation && !written.is_unfinished;
+    let has_image =
+        |written: &&mut WrittenImageFile| written.generation == generation && !written.is_unfinished;
     for written in state.saving.written.iter_mut().filter(has_image) {
         let view = written.shows.and_then(|shows| shows.view).unwrap_or(base);
         written.made = exit_summary::describe_image(report, view);

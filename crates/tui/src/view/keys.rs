@@ -12,7 +12,7 @@ use crate::choice::Choice;
 use crate::keymap::{self, KEYMAP, KeyBinding, OVERLAY, OverlayAction};
 use crate::preview_style::PreviewStyle;
 use crate::scene::report::summarize_diagnostic_counts;
-use crate::state::{KeyboardOverrides, RequestStatus, State, ViewList};
+use crate::state::{KeyboardOverrides, RequestStatus, State, ViewModeList};
 
 /// A hint in the key line: a key with long and short descriptions.
 struct KeyHint {
@@ -63,11 +63,11 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     let mut left = Rect { width: room, ..area };
     let (urgent, useful) = urgent_and_other_hints(state);
     for hint in fit_hints(urgent, useful, toggles, room, is_long) {
-        left = remaining_row_area(left, draw_hint(&hint, left, is_long, state, buffer));
+        left = remaining_row_area(left, draw_single_hint(&hint, left, is_long, state, buffer));
     }
     let mut right = remaining_row_area(area, room);
     for hint in ways {
-        right = remaining_row_area(right, draw_hint(hint, right, true, state, buffer));
+        right = remaining_row_area(right, draw_single_hint(hint, right, true, state, buffer));
     }
 }
 
@@ -94,7 +94,7 @@ fn fit_hints(
     toggles.into_iter().chain(urgent).chain(take(useful)).collect()
 }
 
-fn draw_hint(hint: &KeyHint, area: Rect, is_long: bool, state: &State, buffer: &mut Buffer) -> u16 {
+fn draw_single_hint(hint: &KeyHint, area: Rect, is_long: bool, state: &State, buffer: &mut Buffer) -> u16 {
     let pieces =
         [(hint.key, TextRole::Strong), (" ", TextRole::Plain), (hint.description(is_long), hint.tone)];
     put_text(buffer, area, &pieces, state.display.depth);
@@ -226,7 +226,7 @@ fn urgent_and_other_hints(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
 }
 
 /// Keys for the view list, or the search text.
-fn view_list_hints(views: &ViewList) -> Vec<KeyHint> {
+fn view_list_hints(views: &ViewModeList) -> Vec<KeyHint> {
     match &views.name {
         Some(name) => vec![KeyHint { tone: TextRole::Strong, ..KeyHint::new("/", format!("{name}▏")) }],
         None => [("1-9", "choose"), ("j k", "move"), ("/", "find")]

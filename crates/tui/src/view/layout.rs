@@ -5,7 +5,7 @@
 
 use ratatui::layout::Rect;
 
-use crate::pipeline::protocol::{MaxPreviewSize, Stage};
+use crate::pipeline::protocol::{PreviewBounds, Stage};
 use crate::preview_style::PreviewStyle;
 use crate::state::State;
 
@@ -55,12 +55,12 @@ impl Layout {
     }
 
     /// Size of the largest preview that fits into the window, assuming square pixels.
-    pub(crate) fn max_preview_size(state: &State) -> Option<MaxPreviewSize> {
+    pub(crate) fn max_preview_size(state: &State) -> Option<PreviewBounds> {
         let area = Self::for_state(state).preview;
         let across = state.display.horizontal_pixels_per_cell();
         let height =
             (f32::from(area.height) * state.display.window.cell_aspect * across as f32).round() as u32;
-        (area.width > 0 && height > 0).then_some(MaxPreviewSize {
+        (area.width > 0 && height > 0).then_some(PreviewBounds {
             width: u32::from(area.width) * across,
             height,
             around: state.preview.close_up,

@@ -108,7 +108,7 @@ fn message_position(state: &State, layout: &Layout, words: &str) -> MessagePosit
             MessagePosition::Over(message_area_covering_rows_above(layout, line))
         };
     }
-    let needed = match status_line::reserved_columns(state, layout) {
+    let needed = match status_line::columns_reserved_for_status(state, layout) {
         0 => 0,
         needed => needed + MESSAGE_GAP,
     };

@@ -29,7 +29,7 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
         Some(shown) => {
             let kind = cell_based_style(state.display.kind, state.display.depth);
             let placed = PreviewPlacement::for_preview(state, shown, area, kind);
-            placed.draw(&shown.picture, kind, PreviewColors::for_state(state), buffer);
+            placed.draw(&shown.picture, kind, PreviewColorSettings::for_state(state), buffer);
             marks::draw_marks(state, placed.cells, buffer);
         }
         None if state.overlays.problems.is_none() && area.height > 0 => {
@@ -50,7 +50,7 @@ pub(super) fn draw_history_thumbnail(state: &State, picture: &Srgb8Image, area: 
         let kind = cell_based_style(state.display.kind, state.display.depth);
         let placed =
             PreviewPlacement::fit(picture, area, kind, state.display.window.cell_aspect, f32::INFINITY);
-        placed.draw(picture, kind, PreviewColors::for_state(state), buffer);
+        placed.draw(picture, kind, PreviewColorSettings::for_state(state), buffer);
     }
 }
 
@@ -103,14 +103,14 @@ pub(crate) fn placed_pixel_preview(state: &State, area: Rect) -> Option<PlacedIm
 
 /// Color settings for a preview.
 #[derive(Clone, Copy)]
-pub(crate) struct PreviewColors<'a> {
+pub(crate) struct PreviewColorSettings<'a> {
     pub(crate) depth: ColorDepth,
     pub(crate) shades: &'a ColorMapper,
     /// Whether the terminal's background is light.
     pub(crate) is_light: bool,
 }
 
-impl<'a> PreviewColors<'a> {
+impl<'a> PreviewColorSettings<'a> {
     fn for_state(state: &'a State) -> Self {
         Self { depth: state.display.depth, shades: &state.display.shades, is_light: state.display.is_light }
     }
@@ -125,7 +125,7 @@ pub fn draw_for_dark_xterm(
     area: Rect,
 ) -> Buffer {
     let shades = ColorMapper::new(depth, &XTERM);
-    let inks = PreviewColors { depth, shades: &shades, is_light: false };
+    let inks = PreviewColorSettings { depth, shades: &shades, is_light: false };
     draw_image(picture, choice, inks, area, 2.0)
 }
 
@@ -133,7 +133,7 @@ pub fn draw_for_dark_xterm(
 pub(crate) fn draw_image(
     picture: &Srgb8Image,
     choice: PreviewChoice,
-    inks: PreviewColors<'_>,
+    inks: PreviewColorSettings<'_>,
     area: Rect,
     cell_aspect: f32,
 ) -> Buffer {
@@ -203,7 +203,13 @@ impl PreviewPlacement {
         Self { cells, width: u32::from(width), height: u32::from(height) }
     }
 
-    fn draw(self, picture: &Srgb8Image, kind: PreviewStyle, inks: PreviewColors<'_>, buffer: &mut Buffer) {
+    fn draw(
+        self,
+        picture: &Srgb8Image,
+        kind: PreviewStyle,
+        inks: PreviewColorSettings<'_>,
+        buffer: &mut Buffer,
+    ) {
         let pixels = resized_pixels(picture, self.width, self.height);
         let scaled = ScaledImage { width: self.width, height: self.height, pixels: &pixels };
         let mut each = |draw: &dyn Fn(usize, usize, &mut Cell)| {
@@ -268,7 +274,7 @@ fn draw_two_color_cell(
 fn draw_ascii_cell(
     scaled: &ScaledImage<'_>,
     ramp: AsciiRamp,
-    inks: PreviewColors<'_>,
+    inks: PreviewColorSettings<'_>,
     x: usize,
     y: usize,
     cell: &mut Cell,
@@ -354,7 +360,7 @@ mod tests {
         PreviewPlacement::fit(&one, buffer.area, PreviewStyle::HalfBlock, 2.0, f32::INFINITY).draw(
             &one,
             PreviewStyle::HalfBlock,
-            PreviewColors::for_state(&state),
+            PreviewColorSettings::for_state(&state),
             &mut buffer,
         );
         let cell = &buffer[(0, 1)];
@@ -372,7 +378,7 @@ mod tests {
             PreviewPlacement::fit(&sharp, buffer.area, kind, 2.0, f32::INFINITY).draw(
                 &sharp,
                 kind,
-                PreviewColors::for_state(&state),
+                PreviewColorSettings::for_state(&state),
                 &mut buffer,
             );
             let cell = &buffer[(1, 1)];

@@ -17,17 +17,17 @@ const MIN_DIVIDED_WIDTH: u16 = 3 * ENTRY_WIDTH;
 /// Number of columns available for the panel's lines. The remaining columns are used for the curve and the
 /// history.
 pub(super) fn available_line_width(state: &State, panel: Rect) -> u16 {
-    let is_divided = is_window_wide(state) && panel.width >= MIN_DIVIDED_WIDTH;
+    let is_divided = is_wide_enough_for_curve(state) && panel.width >= MIN_DIVIDED_WIDTH;
     if is_divided { COLUMN_WIDTH } else { panel.width }
 }
 
-fn is_window_wide(state: &State) -> bool {
+fn is_wide_enough_for_curve(state: &State) -> bool {
     state.display.window.columns >= MIN_CURVE_WINDOW_WIDTH
 }
 
 /// Returns the area left for the curve and the history, next to or below the lines.
-fn curve_and_history_area(state: &State, panel: Rect, lines: u16) -> Rect {
-    if !is_window_wide(state) || state.overlays.views.is_some() {
+fn area_beside_or_below_lines(state: &State, panel: Rect, lines: u16) -> Rect {
+    if !is_wide_enough_for_curve(state) || state.overlays.views.is_some() {
         return Rect::ZERO;
     }
     let used = available_line_width(state, panel);
@@ -75,7 +75,7 @@ pub(super) fn history_index_at(
 /// Divides the area between the curve and the strip. The strip is placed at the bottom so that it does not
 /// move when the results change.
 fn divide_chart_and_history_strip(state: &State, panel: Rect, lines: u16) -> (Rect, Rect) {
-    let area = curve_and_history_area(state, panel, lines);
+    let area = area_beside_or_below_lines(state, panel, lines);
     let is_over = state.work.activity == RequestStatus::Done && !state.preview.history.is_viewing_older();
     let wants_curve = |area| is_over && curve::chart_and_caption_height(state, area).is_some();
     if area.width >= MIN_DIVIDED_WIDTH {

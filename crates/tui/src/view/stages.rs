@@ -5,7 +5,7 @@ use super::text::{
     wrap_text,
 };
 use crate::messages;
-use crate::pipeline::protocol::{Stage, StageReport, Status};
+use crate::pipeline::protocol::{Stage, StageReport, StageStatus};
 use crate::scene::sanitize::escape_invisible_chars;
 use crate::state::{AssetProgressBar, State};
 
@@ -66,11 +66,11 @@ fn stage_line(state: &State, stage: Stage, room: u16) -> StyledLine {
     let has_ended = !state.work.is_request_running();
     let (sign, tone, time) = match report.map(|report| (report.status, report.seconds)) {
         None => ("·", TextRole::Faint, String::new()),
-        Some((Status::Running, _)) if has_ended => ("✗", TextRole::Error, "stopped".to_owned()),
-        Some((Status::Running, _)) => (">", TextRole::Working, "…".to_owned()),
-        Some((Status::Done, time)) => ("✓", TextRole::Good, format_seconds(time)),
-        Some((Status::Reused, _)) => ("=", TextRole::Faint, "reused".to_owned()),
-        Some((Status::Skipped, _)) => ("-", TextRole::Faint, "skipped".to_owned()),
+        Some((StageStatus::Running, _)) if has_ended => ("✗", TextRole::Error, "stopped".to_owned()),
+        Some((StageStatus::Running, _)) => (">", TextRole::Working, "…".to_owned()),
+        Some((StageStatus::Done, time)) => ("✓", TextRole::Good, format_seconds(time)),
+        Some((StageStatus::Reused, _)) => ("=", TextRole::Faint, "reused".to_owned()),
+        Some((StageStatus::Skipped, _)) => ("-", TextRole::Faint, "skipped".to_owned()),
     };
     let text_tone =
         if tone == TextRole::Faint { TextRole::Faint } else { stage_role_marking_reruns(state, report) };
@@ -94,25 +94,25 @@ fn stage_line(state: &State, stage: Stage, room: u16) -> StyledLine {
 
 /// Role of a stage's text: strong if an edit caused the stage to run again, otherwise plain.
 fn stage_role_marking_reruns(state: &State, report: Option<&StageReport>) -> TextRole {
-    let has_run_again = report.is_some_and(|it| it.status == Status::Done && state.work.renders > 0);
+    let has_run_again = report.is_some_and(|it| it.status == StageStatus::Done && state.work.renders > 0);
     if has_run_again && state.saving.edits > 0 { TextRole::Strong } else { TextRole::Plain }
 }
 
 /// Difference between the stage's time and its previous time.
 fn stage_time_change_text(state: &State, report: &StageReport) -> String {
     match report.status {
-        Status::Done => format_time_difference(
+        StageStatus::Done => format_time_difference(
             report.seconds,
             state.work.last_seconds.get(report.name as usize).copied().flatten(),
         ),
-        Status::Running | Status::Reused | Status::Skipped => String::new(),
+        StageStatus::Running | StageStatus::Reused | StageStatus::Skipped => String::new(),
     }
 }
 
 /// Lists the stages that took a significant part of the time on one line, followed by the number of cached
 /// stages. The line is shortened to fit, and empty if even the longest stage does not fit.
 pub(super) fn slowest_stages_line(state: &State, room: u16) -> StyledLine {
-    let done = || state.work.stages.iter().flatten().filter(|it| it.status == Status::Done);
+    let done = || state.work.stages.iter().flatten().filter(|it| it.status == StageStatus::Done);
     let total: f64 = done().map(|it| it.seconds).sum();
     let longest = done().map(|it| it.seconds).fold(0.0, f64::max);
     let first = done().find(|it| it.seconds >= longest).map(|it| it.name);
@@ -133,8 +133,8 @@ fn list_stage_times_and_cached_count(
     let mut line = StyledLine::new();
     let mut reused = 0;
     for report in state.work.stages.iter().flatten() {
-        reused += usize::from(report.status == Status::Reused);
-        if report.status == Status::Done && counts(report) {
+        reused += usize::from(report.status == StageStatus::Reused);
+        if report.status == StageStatus::Done && counts(report) {
             let comma = if line.is_empty() { "" } else { ", " };
             line.push((
                 format!("{comma}{} {}", report.name.name(), format_seconds(report.seconds)),
@@ -157,7 +157,7 @@ fn list_stage_times_and_cached_count(
 /// Name of the running stage.
 pub(super) fn running_stage_name(state: &State) -> Option<&'static str> {
     let mut stages = state.work.stages.iter().flatten();
-    stages.find(|stage| stage.status == Status::Running).map(|stage| stage.name.name())
+    stages.find(|stage| stage.status == StageStatus::Running).map(|stage| stage.name.name())
 }
 
 /// Loaded fraction of an asset.

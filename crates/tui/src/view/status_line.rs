@@ -18,7 +18,7 @@ use crate::pipeline::protocol::{NoiseAndTimeToNextLevel, RenderProgress, SavedSc
 use crate::pipeline::words::format_mean_samples;
 use crate::preview_style::PreviewStyle;
 use crate::scene::sanitize::escape_invisible_chars;
-use crate::state::{RequestStatus, SceneImageProgress, State, WrittenFile};
+use crate::state::{RequestStatus, SceneImageRenderProgress, State, WrittenImageFile};
 
 /// Short save hints, for narrow windows.
 const SHORT_HINT: &str = "save it to re-render";
@@ -76,7 +76,7 @@ fn status_content(state: &State) -> StatusContent {
 }
 
 /// Number of columns in the status line that a message must not use.
-pub(super) fn reserved_columns(state: &State, layout: &Layout) -> u16 {
+pub(super) fn columns_reserved_for_status(state: &State, layout: &Layout) -> u16 {
     match status_content(state) {
         StatusContent::Nothing => 0,
         StatusContent::ProgressBar => text_columns(&progress_fraction_and_text(state, layout).1),
@@ -166,7 +166,7 @@ fn draw_summary(
 ) {
     let of_files = written_file_pieces(state, layout);
     // Files take precedence if there is not enough space.
-    let room = area.width.saturating_sub(reserved_columns(state, layout));
+    let room = area.width.saturating_sub(columns_reserved_for_status(state, layout));
     let mut pieces = stages::slowest_stages_line(state, room);
     let comma = if pieces.is_empty() { "" } else { ", " };
     let mut is_room = |more: Vec<(String, TextRole)>| {
@@ -209,7 +209,7 @@ fn draw_summary(
 
 /// Name and size of each written file, or nothing if the panel lists the files.
 fn written_file_pieces(state: &State, layout: &Layout) -> Vec<Vec<(String, TextRole)>> {
-    let pieces = |written: &WrittenFile| {
+    let pieces = |written: &WrittenImageFile| {
         let name = written.escaped_path();
         let size = format!(" {}", format_bytes(written.bytes));
         vec![(" → ".to_owned(), TextRole::Faint), (name, TextRole::File), (size, TextRole::Faint)]
@@ -218,7 +218,7 @@ fn written_file_pieces(state: &State, layout: &Layout) -> Vec<Vec<(String, TextR
 }
 
 /// The files that contain the current image.
-pub(super) fn files_containing_current_image(state: &State) -> impl Iterator<Item = &WrittenFile> {
+pub(super) fn files_containing_current_image(state: &State) -> impl Iterator<Item = &WrittenImageFile> {
     // If the scene's own image has not changed, it may have been written by an earlier request.
     let is_own = state.request.has_no_keyboard_overrides();
     let of_any_request = is_own && state.saving.unwritten.is_none();
@@ -237,10 +237,10 @@ pub(crate) fn unsaved_image_messages(state: &State) -> Vec<String> {
     if files_containing_current_image(state).next().is_some() {
         return Vec::new();
     }
-    let by_hand = saving.written_image_with_key_changes();
+    let by_hand = saving.find_file_with_key_changes();
     if state.request.has_no_keyboard_overrides() {
         let by_hand = by_hand.filter(|_| saving.unwritten.is_none());
-        let words = |file: &WrittenFile| {
+        let words = |file: &WrittenImageFile| {
             messages::written_image_differs(
                 &file.escaped_path(),
                 &file.describe_included_keyboard_changes().join(", "),
@@ -260,15 +260,16 @@ pub(crate) fn unsaved_image_messages(state: &State) -> Vec<String> {
             &file.escaped_path(),
             &file.describe_included_keyboard_changes().join(", "),
         )),
-        (SceneImageProgress { state: SavedSceneRenderStatus::Written, .. }, None, _) | (_, None, None) => {
-            None
-        }
-        (SceneImageProgress { state: SavedSceneRenderStatus::Begun { .. }, fraction }, None, Some(name)) => {
-            Some(messages::saved_scene_render_interrupted(&name, floor_percent(fraction)))
-        }
-        (SceneImageProgress { state: SavedSceneRenderStatus::NotBegun, .. }, None, Some(name)) => {
+        (SceneImageRenderProgress { state: SavedSceneRenderStatus::Written, .. }, None, _)
+        | (_, None, None) => None,
+        (
+            SceneImageRenderProgress { state: SavedSceneRenderStatus::Begun { .. }, fraction },
+            None,
+            Some(name),
+        ) => Some(messages::scene_image_render_interrupted(&name, floor_percent(fraction))),
+        (SceneImageRenderProgress { state: SavedSceneRenderStatus::NotBegun, .. }, None, Some(name)) => {
             let is_older = !saving.written.is_empty() && saving.are_images_older_than_scene();
-            is_older.then(|| messages::scene_image_outdated(&name))
+            is_older.then(|| messages::scene_image_file_outdated(&name))
         }
     };
     [messages::NOT_SAVED.to_owned()].into_iter().chain(other).collect()
@@ -276,7 +277,7 @@ pub(crate) fn unsaved_image_messages(state: &State) -> Vec<String> {
 
 /// Returns a message for each written file that another program has changed.
 pub(super) fn externally_changed_output_messages(state: &State) -> impl Iterator<Item = String> {
-    state.saving.written.iter().filter_map(WrittenFile::describe_external_change)
+    state.saving.written.iter().filter_map(WrittenImageFile::describe_external_change)
 }
 
 /// Time between saving the file and drawing the first changed cell.

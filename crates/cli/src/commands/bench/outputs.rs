@@ -13,9 +13,9 @@ use crate::lower::STDOUT_NAME;
 use crate::output::write::{self, ExistingFilePolicy};
 use crate::output::{
     self, AttributeLossPolicy, FileIdentity, OutputError, check_json_replacement, check_plot_replacement,
-    check_table_replacement, is_same_file,
+    check_table_replacement, may_be_same_file,
 };
-use crate::system::{describe_error, file};
+use crate::system::{describe_io_error, file};
 
 /// Files to write, and input files that must not be overwritten.
 pub(super) struct BenchOutputs {
@@ -87,7 +87,7 @@ impl BenchOutputs {
         if FileIdentity::from_existing_or_new_path(real).is_none() {
             return Ok(());
         }
-        let is_target = |path: &Path| is_same_file(real, path);
+        let is_target = |path: &Path| may_be_same_file(real, path);
         let (option, path, _) = &self.files[index];
         let refused = |what: &str| {
             let reason = format!(
@@ -170,7 +170,7 @@ impl BenchOutputs {
             progress.report_written_file_warning(&warning.to_string());
         });
         let guard = ExistingFilePolicy { is_kept: &is_kept, may_replace: &may_replace, sweep: None, losses };
-        let written = write::atomic_with_policy(path, &bytes, &guard, token);
+        let written = write::write_atomically_with_policy(path, &bytes, &guard, token);
         written.map(|()| bytes.len()).map_err(|error| error.to_string())
     }
 }
@@ -179,7 +179,7 @@ impl BenchOutputs {
 fn read_baseline_bytes(path: &Path) -> Result<Vec<u8>, String> {
     /// Enough for the results of a million images.
     const MAX_BYTES: u64 = 256 << 20;
-    let words = |error: std::io::Error| describe_error(&error);
+    let words = |error: std::io::Error| describe_io_error(&error);
     let (file, metadata) = file::open_regular_file(path)
         .map_err(words)?
         .map_err(|kind| format!("it is {}, not a regular file", kind.description()))?;

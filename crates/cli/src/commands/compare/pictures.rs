@@ -32,9 +32,9 @@ pub(super) fn render_images_as_text(
     }
     let (difference, description) = flip_or_difference_image_and_label(pair, measured);
     let pictures = [
-        tone_map_named_image(&file_name_or_path(&args.a), pair.measured_image()),
-        tone_map_named_image(&format!("{}, the reference", file_name_or_path(&args.b)), pair.reference()),
-        tone_map_named_image(&description, &difference),
+        tone_map_to_named_image(&file_name_or_path(&args.a), pair.measured_image()),
+        tone_map_to_named_image(&format!("{}, the reference", file_name_or_path(&args.b)), pair.reference()),
+        tone_map_to_named_image(&description, &difference),
     ];
     images_as_text(&pictures, args.color, is_terminal)
 }
@@ -50,7 +50,7 @@ fn file_name_or_path(path: &Path) -> String {
 }
 
 /// Tone maps an image for display.
-fn tone_map_named_image(name: &str, image: &RadianceImage) -> NamedImage {
+fn tone_map_to_named_image(name: &str, image: &RadianceImage) -> NamedImage {
     NamedImage {
         name: escape_invisible_chars(name).into_owned(),
         picture: tone_map_to_8_bits(image, &ToneMapping::default()),

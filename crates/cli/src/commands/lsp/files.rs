@@ -86,7 +86,7 @@ impl CheckQueue {
         requests.running = None;
         let is_idle = |requests: &mut CheckRequests| requests.waiting.is_empty() && !requests.is_over;
         let mut requests = self.changed.wait_while(requests, is_idle).unwrap_or_else(PoisonError::into_inner);
-        requests.start_next()
+        requests.dequeue_and_mark_running()
     }
 }
 
@@ -99,7 +99,7 @@ impl CheckRequests {
         self.waiting.push_back((uri, document));
     }
 
-    fn start_next(&mut self) -> Option<(Uri, OpenDocument, CancelToken)> {
+    fn dequeue_and_mark_running(&mut self) -> Option<(Uri, OpenDocument, CancelToken)> {
         let (uri, document) = self.waiting.pop_front().filter(|_| !self.is_over)?;
         let token = CancelToken::new();
         self.running = Some((uri.clone(), token.clone()));
@@ -124,20 +124,22 @@ mod tests {
         let document = |version| OpenDocument::new("a.toml".into(), version, String::new());
         let mut requests = CheckRequests::default();
         requests.enqueue_latest(uri("file:///a"), document(1));
-        let (_, _, first) = requests.start_next().expect("a request");
+        let (_, _, first) = requests.dequeue_and_mark_running().expect("a request");
         for (name, version) in [("file:///b", 1), ("file:///a", 2), ("file:///a", 3)] {
             requests.enqueue_latest(uri(name), document(version));
         }
         assert!(first.is_canceled(), "a newer request replaces it");
-        let mut next = || requests.start_next().map(|(uri, document, _)| (uri.to_string(), document.version));
+        let mut next = || {
+            requests.dequeue_and_mark_running().map(|(uri, document, _)| (uri.to_string(), document.version))
+        };
         assert_eq!(next(), Some(("file:///b".to_owned(), 1)));
         assert_eq!(next(), Some(("file:///a".to_owned(), 3)));
         assert_eq!(next(), None);
         requests.enqueue_latest(uri("file:///b"), document(2));
-        let (_, _, last) = requests.start_next().expect("a request");
+        let (_, _, last) = requests.dequeue_and_mark_running().expect("a request");
         requests.enqueue_latest(uri("file:///c"), document(1));
         assert!(!last.is_canceled());
         requests.shut_down();
-        assert!(last.is_canceled() && requests.start_next().is_none());
+        assert!(last.is_canceled() && requests.dequeue_and_mark_running().is_none());
     }
 }

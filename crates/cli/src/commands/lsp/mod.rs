@@ -114,7 +114,7 @@ struct Server<'c> {
 }
 
 impl Server<'_> {
-    fn documents(&self) -> MutexGuard<'_, HashMap<String, OpenDocument>> {
+    fn lock_documents(&self) -> MutexGuard<'_, HashMap<String, OpenDocument>> {
         self.documents.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -177,7 +177,7 @@ impl Server<'_> {
         look: impl FnOnce(&OpenDocument, usize) -> Option<Value>,
     ) -> Option<Value> {
         let TextDocumentPositionParams { text_document, position } = serde_json::from_value(params).ok()?;
-        let documents = self.documents();
+        let documents = self.lock_documents();
         let document = documents.get(text_document.uri.as_str())?;
         look(document, document.offset(position))
     }
@@ -185,7 +185,7 @@ impl Server<'_> {
     /// Calls a function with the document in `params`. Returns `None` if the document is not open.
     fn with_document(&self, params: &Value, look: impl FnOnce(&OpenDocument) -> Value) -> Option<Value> {
         let uri = params["textDocument"]["uri"].as_str()?;
-        self.documents().get(uri).map(look)
+        self.lock_documents().get(uri).map(look)
     }
 
     fn handle_notification(&mut self, notification: Notification) {
@@ -221,7 +221,7 @@ impl Server<'_> {
             }
             DidCloseTextDocument::METHOD => {
                 if let Some(DidCloseTextDocumentParams { text_document }) = params_if_valid(params) {
-                    self.documents().remove(text_document.uri.as_str());
+                    self.lock_documents().remove(text_document.uri.as_str());
                     self.send(&diagnostics_notification(text_document.uri, None, Vec::new()));
                 }
             }
@@ -239,13 +239,13 @@ impl Server<'_> {
     fn store_and_diagnose_document(&self, uri: &Uri, version: i32, text: String) {
         let document = OpenDocument::new(uri_to_path(uri), version, text);
         let found = diagnostics::text_diagnostics(&document);
-        self.documents().insert(uri.as_str().to_owned(), document);
+        self.lock_documents().insert(uri.as_str().to_owned(), document);
         self.send(&diagnostics_notification(uri.clone(), Some(version), found));
     }
 
     /// Queues a check of the files referenced by a document.
     fn queue_referenced_files_check(&self, uri: &Uri) {
-        let document = self.documents().get(uri.as_str()).cloned();
+        let document = self.lock_documents().get(uri.as_str()).cloned();
         if let (Some(files), Some(document)) = (&self.files, document) {
             files.queue_check(uri.clone(), document);
         }

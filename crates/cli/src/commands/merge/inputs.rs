@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use crate::control::{CancelToken, Canceled};
 use crate::output::part::{self, PartFile};
-use crate::output::{is_same_file, scene_path};
+use crate::output::{may_be_same_file, scene_path};
 use crate::pipeline::{files_referenced_by_assets, not_a_scene_file_error};
 use crate::scene::referenced_files;
 use crate::scene::sanitize::escape_invisible_chars;
@@ -40,7 +40,7 @@ impl<'a> RenderInputFiles<'a> {
     /// Returns [`Canceled`] if the token is canceled.
     pub(super) fn reason_not_to_overwrite(&self, path: &Path) -> Result<Option<String>, Canceled> {
         let find = |files: &BTreeSet<PathBuf>| {
-            let input = files.iter().find(|input| is_same_file(input, path))?;
+            let input = files.iter().find(|input| may_be_same_file(input, path))?;
             // Show the path relative to the working directory.
             let name = scene_path::relative_to_image(input, Path::new(""));
             let name = escape_invisible_chars(name.strip_prefix("./").unwrap_or(&name)).into_owned();

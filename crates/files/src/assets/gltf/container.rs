@@ -51,7 +51,7 @@ impl GltfFile {
             return Err(AssetError::malformed(path, None, reason));
         }
         let mut root: Root = serde_json::from_slice(text).map_err(|error| {
-            if let Some(version) = pre_2_0_version(text) {
+            if let Some(version) = version_of_pre_2_0_file(text) {
                 return wrong(GltfError::new(unsupported_version_message(&version)));
             }
             let what = error.to_string();
@@ -131,7 +131,7 @@ pub(super) const DRACO: &str = "KHR_draco_mesh_compression";
 
 /// Returns the version of a file that predates glTF 2.0, or `None` for other files. Such a file does not
 /// parse as [`Root`], because older versions use JSON objects where glTF 2.0 uses arrays.
-fn pre_2_0_version(text: &[u8]) -> Option<String> {
+fn version_of_pre_2_0_file(text: &[u8]) -> Option<String> {
     #[derive(serde::Deserialize)]
     struct AssetOnlyRoot {
         asset: JsonAsset,
@@ -165,10 +165,10 @@ pub(super) fn truncate_parser_message(text: &str) -> String {
     text.chars().take(200).collect()
 }
 
-type Range = std::ops::Range<usize>;
+type ByteRange = std::ops::Range<usize>;
 
 /// Byte ranges of the JSON and binary chunks in a GLB file (4.4).
-fn glb_chunk_ranges(bytes: &[u8]) -> Result<(Range, Option<Range>), GltfError> {
+fn glb_chunk_ranges(bytes: &[u8]) -> Result<(ByteRange, Option<ByteRange>), GltfError> {
     const JSON: u32 = 0x4e4f_534a;
     const BINARY: u32 = 0x004e_4942;
     let word = |at: usize| bytes.get(at..at + 4)?.first_chunk().copied().map(u32::from_le_bytes);

@@ -4,7 +4,7 @@ use ::image::ImageError;
 use ::image::error::LimitErrorKind;
 
 use super::jpeg;
-use crate::system::describe_error;
+use crate::system::describe_io_error;
 
 /// Error message for an empty file.
 pub(super) const EMPTY_FILE: &str = "the file is empty";
@@ -48,7 +48,7 @@ pub(super) fn shorten_decoder_error(error: &ImageError) -> String {
         ImageError::IoError(error) if error.kind() == std::io::ErrorKind::UnexpectedEof => {
             jpeg::TRUNCATED.to_owned()
         }
-        ImageError::IoError(error) => describe_error(error),
+        ImageError::IoError(error) => describe_io_error(error),
         ImageError::Limits(error) if error.kind() == LimitErrorKind::InsufficientMemory => {
             "it needs more memory than the limit for images".to_owned()
         }

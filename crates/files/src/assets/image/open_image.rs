@@ -26,7 +26,7 @@ use super::{
     EmbeddedImage, ImageLimits, decode_thread, hdr, jpeg, pfm, png, read_dimensions_and_memory_size,
 };
 use crate::control::{CancelToken, ignore_progress};
-use crate::system::describe_error;
+use crate::system::describe_io_error;
 
 /// Maximum size of an image file.
 const FILE_LIMIT: u64 = 4 << 30;
@@ -191,10 +191,10 @@ impl OpenImage {
             ImageStream::Embedded(_) => {}
         }
         let mut bytes = BufReader::new(ProgressReader::new(self.file, self.length, report));
-        let first = bytes.fill_buf().map_err(|error| describe_error(&error))?;
+        let first = bytes.fill_buf().map_err(|error| describe_io_error(&error))?;
         let (is_hdr, is_pfm) = (first.starts_with(hdr::MAGIC), pfm::is_pfm(first));
         let mut reader =
-            ImageReader::new(bytes).with_guessed_format().map_err(|error| describe_error(&error))?;
+            ImageReader::new(bytes).with_guessed_format().map_err(|error| describe_io_error(&error))?;
         if is_hdr {
             reader.set_format(ImageFormat::Hdr);
         }

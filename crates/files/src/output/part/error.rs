@@ -4,13 +4,13 @@ use std::io;
 use std::path::PathBuf;
 
 use crate::system::file::FileKind;
-use crate::system::{describe_error, is_too_many_open_files};
+use crate::system::{describe_io_error, is_too_many_open_files};
 
 /// Reason why parts cannot be merged or a checkpoint cannot be resumed.
 #[derive(Debug, thiserror::Error)]
 pub enum PartError {
     /// The file cannot be read.
-    #[error("{}: {}", path.display(), describe_error(source))]
+    #[error("{}: {}", path.display(), describe_io_error(source))]
     Unreadable {
         /// The file.
         path: PathBuf,

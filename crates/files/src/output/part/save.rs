@@ -8,14 +8,14 @@ use std::sync::mpsc::{self, SyncSender};
 use serde_json::Value;
 
 use super::super::OutputError;
-use super::super::write::{Durability, ExistingFilePolicy, atomic_from_callback};
+use super::super::write::{Durability, ExistingFilePolicy, write_atomically_from_callback};
 use super::{Digest, FOOTER, Footer, MAGIC, PartHeader, VERSION, digest};
 use crate::control::CancelToken;
 use crate::film::Film;
 
 /// Writes a film with its header atomically. `state` is opaque data for resuming the render. Other threads
 /// may keep adding samples to the film. Each tile is written with the samples it has at that moment. Returns
-/// the file, like [`atomic_from_callback`].
+/// the file, like [`write_atomically_from_callback`].
 ///
 /// # Errors
 /// The file cannot be written.
@@ -28,7 +28,7 @@ pub fn save(
     token: &CancelToken,
     durability: Durability,
 ) -> Result<Option<File>, OutputError> {
-    atomic_from_callback(
+    write_atomically_from_callback(
         path,
         &|file| encode_and_write(file, head, film, state, token),
         guard,

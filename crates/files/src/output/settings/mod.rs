@@ -12,7 +12,7 @@ use ::exr::meta::MetaData;
 
 use super::part::{PartFile, PartFileKind};
 use super::{PROGRAM, SOFTWARE};
-use crate::system::describe_error;
+use crate::system::describe_io_error;
 use crate::system::file::{self, PART_MAGIC};
 
 /// Number of bytes to search for settings at the start of a file.
@@ -104,9 +104,9 @@ pub fn read_image_info(path: &Path) -> Result<ImageFileInfo, ImageInfoReadError>
     let (opened, _) = match file::open_regular_file(path) {
         Ok(Ok(found)) => found,
         Ok(Err(kind)) => return Err(unreadable(format!("it is {}, not a regular file", kind.description()))),
-        Err(error) => return Err(unreadable(describe_error(&error))),
+        Err(error) => return Err(unreadable(describe_io_error(&error))),
     };
-    let start = read_start(&opened).map_err(|error| unreadable(describe_error(&error)))?;
+    let start = read_start(&opened).map_err(|error| unreadable(describe_io_error(&error)))?;
     if start.starts_with(&PART_MAGIC) {
         // `read_part_file_info` opens the file again. Use only one descriptor at a time.
         drop(opened);

@@ -9,7 +9,7 @@ mod traverse;
 use crate::geometry::Aabb;
 
 pub use packet::{AnyHitCallback, ClosestHitCallback};
-pub use shell::{PrimitiveOrEnclosingSubtree, SphericalShell};
+pub use shell::{PrimitiveOrSubtreeAroundBox, SphericalShell};
 use top_node::WideTopNode;
 
 /// Maximum number of primitives in a leaf chosen by the surface area heuristic.

@@ -154,7 +154,7 @@ impl Bvh {
         if traced == 0 {
             return (0, [0.0; PACKET_SIZE]);
         }
-        self.top.beam_hits_and_entries(
+        self.top.subtree_hits_and_entries(
             &RayPacketBounds::from_ray_packet(slabs.origin, &slabs.inverse, (ends, traced), simd),
             simd,
         )

@@ -104,7 +104,7 @@ impl SphericalShell {
 
 /// A primitive or subtree reported by [`Bvh::visit_surfaces_overlapping_box`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PrimitiveOrEnclosingSubtree {
+pub enum PrimitiveOrSubtreeAroundBox {
     /// A primitive whose surface may intersect the box.
     Primitive(u32),
     /// A subtree in which every primitive encloses the box, identified by its index in
@@ -178,12 +178,12 @@ impl Bvh {
     pub fn visit_surfaces_overlapping_box(
         &self,
         other: &Aabb,
-        mut visit: impl FnMut(PrimitiveOrEnclosingSubtree) -> bool,
+        mut visit: impl FnMut(PrimitiveOrSubtreeAroundBox) -> bool,
     ) {
         let Some(shells) = &self.shells else {
             let mut continues = true;
             return self.visit_overlapping(other, |id| {
-                continues = continues && visit(PrimitiveOrEnclosingSubtree::Primitive(id));
+                continues = continues && visit(PrimitiveOrSubtreeAroundBox::Primitive(id));
             });
         };
         let mut stack = ArrayVec::<ChildRef, { DEEP_STACK + 1 }>::new();
@@ -191,7 +191,7 @@ impl Bvh {
         while let Some(ChildRef { first, count }) = stack.pop() {
             if count > 0 {
                 let ids = &self.order[first as usize..(first + count) as usize];
-                if !ids.iter().all(|&id| visit(PrimitiveOrEnclosingSubtree::Primitive(id))) {
+                if !ids.iter().all(|&id| visit(PrimitiveOrSubtreeAroundBox::Primitive(id))) {
                     return;
                 }
                 continue;
@@ -202,7 +202,7 @@ impl Bvh {
                     BoxShellRelation::Outside => {}
                     BoxShellRelation::Near => stack.push(node.child[side]),
                     BoxShellRelation::Enclosed
-                        if visit(PrimitiveOrEnclosingSubtree::Enclosing(2 * first as usize + side)) => {}
+                        if visit(PrimitiveOrSubtreeAroundBox::Enclosing(2 * first as usize + side)) => {}
                     BoxShellRelation::Enclosed => return,
                 }
             }

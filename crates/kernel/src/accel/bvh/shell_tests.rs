@@ -84,8 +84,8 @@ fn nested_box_queries_match_brute_force() {
             let (mut visited, mut enclosing) = (Vec::new(), Vec::new());
             tree.visit_surfaces_overlapping_box(&near, |surface| {
                 match surface {
-                    PrimitiveOrEnclosingSubtree::Primitive(id) => visited.push(id),
-                    PrimitiveOrEnclosingSubtree::Enclosing(subtree) => enclosing.extend(&last[subtree]),
+                    PrimitiveOrSubtreeAroundBox::Primitive(id) => visited.push(id),
+                    PrimitiveOrSubtreeAroundBox::Enclosing(subtree) => enclosing.extend(&last[subtree]),
                 }
                 true
             });

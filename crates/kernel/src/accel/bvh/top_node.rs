@@ -87,7 +87,7 @@ impl WideTopNode {
 
     /// Mask of the subtrees that the rays in a beam may hit, and lower bounds on the entry distances.
     #[inline(always)]
-    pub(super) fn beam_hits_and_entries(&self, beam: &RayPacketBounds, simd: impl Simd) -> (u32, F32x16) {
+    pub(super) fn subtree_hits_and_entries(&self, beam: &RayPacketBounds, simd: impl Simd) -> (u32, F32x16) {
         let (mut near, mut far) = ([0.0_f32; PACKET_SIZE], [beam.end * SLAB_PAD; PACKET_SIZE]);
         for axis in 0..3 {
             let [low, high] = beam.inverse[axis];
@@ -159,7 +159,7 @@ impl RayPacketBounds {
 impl Bvh {
     /// Whether every subtree of the top node is a single primitive.
     #[cfg(test)]
-    pub(super) fn is_single_level(&self) -> bool {
+    pub(super) fn fits_in_top_node(&self) -> bool {
         self.top.child.iter().enumerate().all(|(i, child)| self.top.used >> i & 1 == 0 || child.count == 1)
     }
 }
@@ -203,7 +203,7 @@ mod tests {
             };
             let boxes: Vec<Aabb> = (0..count).map(|_| cell(&mut next)).collect();
             let tree = Bvh::build(&boxes, &CancelToken::new()).expect("never canceled");
-            assert_eq!(tree.is_single_level(), count <= PACKET_SIZE, "{count}");
+            assert_eq!(tree.fits_in_top_node(), count <= PACKET_SIZE, "{count}");
             let (mut tested, mut hits) = (0, 0);
             for round in 0..600 {
                 let (from, to) = (Vec3::new(next(), next(), next()) * 6.0, Vec3::new(next(), next(), next()));

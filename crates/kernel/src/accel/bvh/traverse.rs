@@ -96,7 +96,7 @@ impl Bvh {
 
     /// Visits the nodes whose boxes a ray hits, parents first, in an order that depends only on the tree.
     /// `visit` returns whether to descend. `own` receives the id and depth of each leaf entry.
-    pub fn visit_nodes_along_ray(
+    pub fn visit_nodes_hit_by_ray(
         &self,
         ray: &Ray,
         mut visit: impl FnMut(&NodeBoundsAndDepth, &RayBoxInterval) -> bool,

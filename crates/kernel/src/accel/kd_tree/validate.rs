@@ -60,7 +60,7 @@ impl KdTree {
                     let [below, above] = split_box(cell, axis, at);
                     for (place, cell) in [(right, above), (place + 1, below)] {
                         let touches = |id: &&u32| {
-                            !ClippedPolygon::clip_to_box(corners(**id), &cell).points().is_empty()
+                            !ClippedPolygon::clip_triangle_to_box(corners(**id), &cell).points().is_empty()
                         };
                         let inside = inside.iter().filter(touches).copied().collect();
                         pending.push(NodeToCheck { place, cell, depth: depth + 1, inside });
@@ -113,7 +113,7 @@ fn boxes_overlap(a: &Aabb, b: &Aabb) -> bool {
 
 /// Whether a triangle extends into a cell, not counting parts of the triangle that are in a face of the cell.
 fn triangle_enters_cell(cell: &Aabb, corners: [Vec3; 3]) -> bool {
-    let (min, max) = ClippedPolygon::clip_to_box(corners, cell).bounds();
+    let (min, max) = ClippedPolygon::clip_triangle_to_box(corners, cell).bounds();
     (0..3).all(|axis| {
         let (low, high) = (f64::from(cell.min[axis]), f64::from(cell.max[axis]));
         let rounding = 1e-12 * low.abs().max(high.abs());

@@ -26,12 +26,12 @@ pub struct WideBvh {
     packs: Vec<TrianglePack>,
     bounds: Aabb,
     instructions: InstructionSet,
-    quality: Quality,
+    quality: BuildQuality,
 }
 
 /// Build quality of a tree.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Quality {
+pub enum BuildQuality {
     /// Each triangle is in one leaf.
     #[default]
     Medium,
@@ -49,7 +49,7 @@ impl WideBvh {
         corners: impl Fn(u32) -> [Vec3; 3] + Sync,
         token: &CancelToken,
     ) -> Result<Self, Canceled> {
-        Self::build_with_quality(Quality::default(), count, corners, token)
+        Self::build_with_quality(BuildQuality::default(), count, corners, token)
     }
 
     /// Builds a tree with the given quality, which does not affect the hits.
@@ -57,7 +57,7 @@ impl WideBvh {
     /// # Errors
     /// [`Canceled`] if the build was canceled.
     pub fn build_with_quality(
-        quality: Quality,
+        quality: BuildQuality,
         count: u32,
         corners: impl Fn(u32) -> [Vec3; 3] + Sync,
         token: &CancelToken,
@@ -108,7 +108,7 @@ impl WideBvh {
 
     /// Visits the nodes whose boxes the ray hits, parents first, in an order that depends only on the tree.
     /// `visit` returns whether to descend.
-    pub fn visit_nodes_along_ray(
+    pub fn visit_nodes_hit_by_ray(
         &self,
         ray: &Ray,
         mut visit: impl FnMut(&NodeBoundsAndDepth, &RayBoxInterval) -> bool,
@@ -221,7 +221,7 @@ impl WideBvh {
     /// A description of the first error found.
     pub fn validate(&self, count: u32, corners: impl Fn(u32) -> [Vec3; 3]) -> Result<(), String> {
         let mut leaves: Vec<Vec<Aabb>> = vec![Vec::new(); count as usize];
-        let in_pieces = self.quality == Quality::High;
+        let in_pieces = self.quality == BuildQuality::High;
         let mut pending: Vec<(u32, Aabb)> =
             if self.nodes.is_empty() { Vec::new() } else { vec![(0, self.bounds)] };
         while let Some((index, outer)) = pending.pop() {
@@ -303,10 +303,10 @@ mod tests {
     use crate::math::random::signed_number_generator as random;
 
     fn built(mesh: &[[Vec3; 3]]) -> WideBvh {
-        built_with(Quality::Medium, mesh)
+        built_with(BuildQuality::Medium, mesh)
     }
 
-    fn built_with(quality: Quality, mesh: &[[Vec3; 3]]) -> WideBvh {
+    fn built_with(quality: BuildQuality, mesh: &[[Vec3; 3]]) -> WideBvh {
         let tree = WideBvh::build_with_quality(
             quality,
             mesh.len() as u32,
@@ -321,7 +321,7 @@ mod tests {
     #[test]
     fn traversals_match_brute_force_bit_for_bit() {
         for (number, mesh) in difficult_meshes().iter().enumerate() {
-            let trees = [Quality::Medium, Quality::High].map(|quality| built_with(quality, mesh));
+            let trees = [BuildQuality::Medium, BuildQuality::High].map(|quality| built_with(quality, mesh));
             let trees = trees.iter().flat_map(|tree| {
                 InstructionSet::ALL.map(|instructions| tree.clone().with_instruction_set(instructions))
             });

@@ -82,7 +82,7 @@ impl WideNode {
     };
 
     /// Sets a slot's box and child.
-    pub fn set(&mut self, slot: usize, bounds: Aabb, child: Child) {
+    pub fn set_child(&mut self, slot: usize, bounds: Aabb, child: Child) {
         for axis in 0..3 {
             self.rows[2 * axis][slot] = bounds.min[axis];
             self.rows[2 * axis + 1][slot] = bounds.max[axis];

@@ -38,7 +38,7 @@ impl ShapeEmitter for BoxEmitter {
     /// over this solid angle.
     #[inline(always)]
     fn sample(&self, point: Vec3, u: [f32; 2]) -> SampledLightPoint {
-        let BoxView { signs, faces } = self.seen_from(point);
+        let BoxView { signs, faces } = self.view_from(point);
         let [a, b, c] = faces.map(|face| face.solid_angle);
         let total = a + b + c;
         let target = u[0] * total;
@@ -67,7 +67,7 @@ impl ShapeEmitter for BoxEmitter {
     }
 
     fn pdf(&self, from: Vec3, hit: &LightHitPoint) -> f32 {
-        let BoxView { faces, .. } = self.seen_from(from);
+        let BoxView { faces, .. } = self.view_from(from);
         let total: f32 = faces.iter().map(|face| face.solid_angle).sum();
         let own = faces.iter().zip(self.axes).enumerate();
         let own = own.into_iter().find(|(_, (_, axis))| axis.dot(hit.normal).abs() > 0.9);
@@ -99,7 +99,7 @@ impl BoxEmitter {
     }
 
     #[inline(always)]
-    fn seen_from(&self, point: Vec3) -> BoxView {
+    fn view_from(&self, point: Vec3) -> BoxView {
         let from_center = (point.as_dvec3() - self.center).as_vec3();
         let local = self.axes.map(|axis| from_center.dot(axis));
         let face = |k: usize| {

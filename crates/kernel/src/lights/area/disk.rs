@@ -49,7 +49,7 @@ impl ShapeEmitter for DiskEmitter {
 
     fn pdf(&self, from: Vec3, hit: &LightHitPoint) -> f32 {
         let view = self.view_from(from);
-        if view.is_front() { view.pdf(hit.direction) as f32 } else { 0.0 }
+        if view.is_front_visible() { view.pdf(hit.direction) as f32 } else { 0.0 }
     }
 
     fn area_centroid(&self) -> DVec3 {
@@ -121,7 +121,7 @@ impl DiskEmitter {
 impl DiskView {
     /// Whether the front is visible.
     #[inline(always)]
-    pub fn is_front(&self) -> bool {
+    pub fn is_front_visible(&self) -> bool {
         self.height > 0.0
     }
 

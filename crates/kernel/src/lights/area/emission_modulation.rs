@@ -67,7 +67,7 @@ impl EmissionTerm {
     }
 
     /// Whether the term varies with position or direction.
-    pub fn varies(&self) -> bool {
+    pub fn varies_in_space_or_angle(&self) -> bool {
         self.varies_with_position() || self.coat.is_some()
     }
 
@@ -135,7 +135,11 @@ impl EmissionModulation {
 
     /// Creates the factor from its terms. Returns `None` if none of them varies.
     pub fn from_terms(terms: Vec<EmissionTerm>, chart: UvMapping) -> Option<Self> {
-        terms.iter().any(EmissionTerm::varies).then_some(Self { terms, chart, object_frame: None })
+        terms.iter().any(EmissionTerm::varies_in_space_or_angle).then_some(Self {
+            terms,
+            chart,
+            object_frame: None,
+        })
     }
 
     /// Sets the map from the shape's own coordinates to world coordinates, for textures that use them.

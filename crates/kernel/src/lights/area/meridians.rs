@@ -63,7 +63,7 @@ impl AzimuthDistribution {
 
     /// Integral of the weight over all angles.
     pub fn total(&self) -> f64 {
-        2.0 * self.reach * self.scaled_angle.mean()
+        2.0 * self.reach * self.scaled_angle.integral()
     }
 
     /// Samples an angle. Returns the angle and its density per radian.

@@ -42,7 +42,7 @@ use disk::DiskEmitter;
 use inside::InwardEmitter;
 use mesh::TrianglePairQuad;
 use quad::QuadEmitter;
-use see_through::SeeThroughShapeSide;
+use see_through::SeeThroughSideEmitter;
 use sphere::SphereEmitter;
 use surface_of_revolution::{CappedRevolutionEmitter, ConeSide, CylinderSide};
 use textured_quad::TexturedQuadEmitter;
@@ -125,7 +125,7 @@ pub enum Emitter {
     /// The inside of a shape.
     Inside(Box<InwardEmitter>),
     /// One side of a see-through shape. Near parts do not occlude far parts.
-    SeeThrough(Box<SeeThroughShapeSide>),
+    SeeThrough(Box<SeeThroughSideEmitter>),
     /// Triangles of a mesh.
     Mesh(MeshEmitter),
 }
@@ -241,7 +241,7 @@ pub fn create_see_through_side_light(
         Side::Front => front_area_light(shape, radiance, object)?,
         Side::Back => back_area_light(shape, radiance, object)?,
     };
-    let see_through = if hides_itself { SeeThroughShapeSide::new(shape, side) } else { None };
+    let see_through = if hides_itself { SeeThroughSideEmitter::new(shape, side) } else { None };
     Some(match see_through {
         Some(see_through) => AreaLight { shape: Emitter::SeeThrough(Box::new(see_through)), ..light },
         None => light,

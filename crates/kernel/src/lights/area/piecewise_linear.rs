@@ -9,14 +9,14 @@ impl<const NODES: usize> PiecewiseLinear<NODES> {
     const PIECES: f64 = (NODES - 1) as f64;
 
     /// Mean of the interpolated values.
-    pub fn mean(&self) -> f64 {
+    pub fn integral(&self) -> f64 {
         let inner: f64 = self.0[1..NODES - 1].iter().sum();
         (inner + 0.5 * (self.0[0] + self.0[NODES - 1])) / Self::PIECES
     }
 
     /// Inverts the cumulative distribution at `u` in [0, 1). Returns the position and its density.
     pub fn sample(&self, u: f64) -> (f64, f64) {
-        let mean = self.mean();
+        let mean = self.integral();
         let (mut rest, mut piece) = (u * mean * Self::PIECES, 0);
         while piece < NODES - 2 {
             let own = 0.5 * (self.0[piece] + self.0[piece + 1]);
@@ -37,7 +37,7 @@ impl<const NODES: usize> PiecewiseLinear<NODES> {
         let place = place * Self::PIECES;
         let piece = (place as usize).min(NODES - 2);
         let along = (place - piece as f64).min(1.0);
-        (self.0[piece] + (self.0[piece + 1] - self.0[piece]) * along) / self.mean()
+        (self.0[piece] + (self.0[piece + 1] - self.0[piece]) * along) / self.integral()
     }
 }
 

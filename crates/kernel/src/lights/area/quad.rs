@@ -174,7 +174,7 @@ impl RectangleEdges {
 /// Sine of the angle at which a side is seen. `side` is the side's coordinate, and `d2` is the squared
 /// distance perpendicular to the coordinate axis.
 #[inline(always)]
-fn side_plane_sine(side: f32, d2: f32) -> f32 {
+fn side_elevation_sine(side: f32, d2: f32) -> f32 {
     side / (d2 + side * side).sqrt()
 }
 
@@ -189,8 +189,8 @@ impl SphericalRectangle {
     #[inline(always)]
     pub fn new([x0, x1]: [f32; 2], [y0, y1]: [f32; 2], z: f32) -> Self {
         let z2 = z * z;
-        let (lower, right) = (-side_plane_sine(y0, z2), side_plane_sine(x1, z2));
-        let (upper, left) = (side_plane_sine(y1, z2), -side_plane_sine(x0, z2));
+        let (lower, right) = (-side_elevation_sine(y0, z2), side_elevation_sine(x1, z2));
+        let (upper, left) = (side_elevation_sine(y1, z2), -side_elevation_sine(x0, z2));
         let (g0, g1) = (dihedral_angle(lower, right), dihedral_angle(right, upper));
         let (g2, g3) = (dihedral_angle(upper, left), dihedral_angle(left, lower));
         Self {
@@ -259,7 +259,7 @@ impl SphericalRectangle {
         let x = (-self.z * sin / root).max(self.x[0]).min(self.x[1]);
         // At this x, the heights on the unit circle are uniformly distributed.
         let d2 = x * x + self.z * self.z;
-        let (h0, h1) = (side_plane_sine(self.y[0], d2), side_plane_sine(self.y[1], d2));
+        let (h0, h1) = (side_elevation_sine(self.y[0], d2), side_elevation_sine(self.y[1], d2));
         let h = h0 + u[1] * (h1 - h0);
         let rest = (1.0 - h * h).max(f32::MIN_POSITIVE);
         let y = (h * (d2 / rest).sqrt()).max(self.y[0]).min(self.y[1]);

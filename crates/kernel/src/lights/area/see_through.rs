@@ -8,14 +8,14 @@ use crate::sampling::distribution::DiscreteDistribution;
 
 /// One side of a shape, sampled by area. Shadow rays account for other parts of the shape along the way.
 #[derive(Clone, Debug, PartialEq)]
-pub struct SeeThroughShapeSide {
+pub struct SeeThroughSideEmitter {
     shape: Shape,
     by_area: DiscreteDistribution,
     /// 1 for the front, −1 for the back.
     outwards: f64,
 }
 
-impl SeeThroughShapeSide {
+impl SeeThroughSideEmitter {
     /// Creates an emitter for one side of a shape, or returns `None` if the shape has no area.
     pub fn new(shape: &Shape, side: Side) -> Option<Self> {
         let outwards = match side {
@@ -30,7 +30,7 @@ impl SeeThroughShapeSide {
     }
 }
 
-impl ShapeEmitter for SeeThroughShapeSide {
+impl ShapeEmitter for SeeThroughSideEmitter {
     fn sample(&self, point: Vec3, u: [f32; 2]) -> SampledLightPoint {
         let (part, rest) = self.by_area.sample(u[0]);
         let SurfaceSample { point: place, normal } =

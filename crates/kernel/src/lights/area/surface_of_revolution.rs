@@ -107,7 +107,7 @@ impl<S: RevolutionSide> CappedRevolutionEmitter<S> {
         });
         let side = side.filter(|(_, meridians)| meridians.total() > 0.0);
         let caps = self.caps.iter().flatten().map(|cap| (cap.view_from(point), cap.normal()));
-        let cap = caps.into_iter().find(|(cap, _)| cap.is_front());
+        let cap = caps.into_iter().find(|(cap, _)| cap.is_front_visible());
         let solid_angle = side.as_ref().map_or(0.0, |(_, meridians)| meridians.total());
         let of_cap = cap.as_ref().map_or(0.0, |(cap, _)| cap.solid_angle_bound());
         let side_probability = if side.is_none() { 0.0 } else { solid_angle / (solid_angle + of_cap) };

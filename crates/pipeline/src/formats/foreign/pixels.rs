@@ -30,7 +30,7 @@ impl Pixels {
         top.lerp(texel(x, y + 1).lerp(texel(x + 1, y + 1), part.x), part.y)
     }
 
-    /// Encodes the image as PFM. `is_image_gray_memoized` keeps only the first component.
+    /// Encodes the image as PFM. `is_gray` keeps only the first component.
     pub(crate) fn encode_pfm(&self, is_gray: bool) -> Vec<u8> {
         let magic = if is_gray { "Pf" } else { "PF" };
         let mut bytes = format!("{magic}\n{} {}\n-1.0\n", self.width, self.height).into_bytes();

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::super::model::UsedNames;
-use super::super::rounding::{shorten, shorten_color, shorten_pair};
+use super::super::rounding::{shorten_color, shorten_number, shorten_pair};
 use super::SceneBuilder;
 use crate::assets::gltf::{
     AlphaMode, DiffuseTransmission, ModelMaterial, TextureRef, TextureWrap, TexturedValue,
@@ -137,7 +137,7 @@ impl MaterialBuilder<'_, '_> {
             }
         }
         if material.ior != 1.5 {
-            keys.push(("ior", shorten(material.ior).into()));
+            keys.push(("ior", shorten_number(material.ior).into()));
         }
         self.add_common_keys(&mut keys, material);
         let document = &mut self.scene.document;
@@ -181,7 +181,7 @@ impl MaterialBuilder<'_, '_> {
             let name = self.ensure_texture_table(normal, TextureUse::Normals, DVec3::ONE);
             keys.push(("normal_map", name.into()));
             if material.normal_strength != 1.0 {
-                keys.push(("normal_strength", shorten(material.normal_strength).into()));
+                keys.push(("normal_strength", shorten_number(material.normal_strength).into()));
             }
         }
         if material.glass.is_some() {
@@ -193,7 +193,7 @@ impl MaterialBuilder<'_, '_> {
                 self.add_opacity(keys, value, &material.color);
                 // A cutoff has no effect if it is 0 or if alpha is always 1.
                 if *cutoff > 0.0 && (value.texture.is_some() || value.factor != DVec3::ONE) {
-                    keys.push(("opacity_cutoff", shorten(*cutoff).into()));
+                    keys.push(("opacity_cutoff", shorten_number(*cutoff).into()));
                 }
             }
             AlphaMode::Blend(value) => self.add_opacity(keys, value, &material.color),
@@ -214,7 +214,9 @@ impl MaterialBuilder<'_, '_> {
                 let name = self.ensure_texture_table(texture, use_, value.factor);
                 keys.push(("opacity", texture_channel_reference(name, "a")));
             }
-            None if value.factor != DVec3::ONE => keys.push(("opacity", shorten(value.factor.x).into())),
+            None if value.factor != DVec3::ONE => {
+                keys.push(("opacity", shorten_number(value.factor.x).into()));
+            }
             None => {}
         }
     }
@@ -252,7 +254,7 @@ impl MaterialBuilder<'_, '_> {
                 let name = self.ensure_texture_table(texture, TextureUse::Numbers, slot.factor);
                 keys.push((key, texture_channel_reference(name, channel)));
             }
-            None if slot.factor.x != usual => keys.push((key, shorten(slot.factor.x).into())),
+            None if slot.factor.x != usual => keys.push((key, shorten_number(slot.factor.x).into())),
             None => {}
         }
     }
@@ -275,7 +277,7 @@ impl MaterialBuilder<'_, '_> {
             keys.push(("repeat", shorten_pair(texture.repeat).into()));
         }
         if texture.rotate != 0.0 {
-            keys.push(("rotate", shorten(texture.rotate).into()));
+            keys.push(("rotate", shorten_number(texture.rotate).into()));
         }
         if texture.offset != Vec2::ZERO {
             keys.push(("offset", shorten_pair(texture.offset).into()));

@@ -11,9 +11,9 @@ use super::foreign::ForeignError;
 use super::frame::{CameraPose, FOV, frame_model, round_to_decimals_of_step};
 use super::model::{
     DEFAULT_SIZE, Lighting, ModelViewOptions, POLISHED_ROUGHNESS, UsedNames, add_camera_table, add_ground,
-    add_render_settings, add_sky_and_key_light, file_name, model_warning,
+    add_lighting, add_render_settings, file_name, model_warning,
 };
-use super::rounding::{shorten, shorten_color, shorten_vector};
+use super::rounding::{shorten_color, shorten_number, shorten_vector};
 use super::{ForeignReadContext, ForeignScene, ImportedScene, scene_from_document};
 use crate::assets::gltf::{
     AlphaMode, GltfFile, ImageLocation, ModelCamera, ModelInstance, ModelLight, ModelLightKind,
@@ -188,7 +188,7 @@ impl SceneBuilder<'_> {
                 eye
             }
         };
-        add_sky_and_key_light(&mut self.document, &eye, lighting);
+        add_lighting(&mut self.document, &eye, lighting);
         if !scene.lights.is_empty() {
             self.document
                 .add_comment_above_next_table("1 cd in the file is treated as 1 W/sr, and 1 lx as 1 W/m².");
@@ -227,8 +227,8 @@ impl SceneBuilder<'_> {
         }
         if let ModelLightKind::Spot { angle, blend } = light.kind {
             document.set("look_at", shorten_vector(light.position + light.direction));
-            document.set("angle", shorten(angle.min(359.0)));
-            document.set("blend", shorten(blend));
+            document.set("angle", shorten_number(angle.min(359.0)));
+            document.set("blend", shorten_number(blend));
         }
     }
 
@@ -271,7 +271,8 @@ impl SceneBuilder<'_> {
             return;
         }
         let rows = linear.transpose();
-        let row = |axis: DVec3, last: f64| [axis.x, axis.y, axis.z, last].map(zero_if_tiny).map(shorten);
+        let row =
+            |axis: DVec3, last: f64| [axis.x, axis.y, axis.z, last].map(zero_if_tiny).map(shorten_number);
         let rows =
             [row(rows.x_axis, translate.x), row(rows.y_axis, translate.y), row(rows.z_axis, translate.z)];
         let matrix = [&rows[..], &[[0.0, 0.0, 0.0, 1.0]]].concat().concat();

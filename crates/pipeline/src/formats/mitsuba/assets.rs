@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use super::reader::SceneReader;
-use super::xml::shorten;
+use super::xml::truncate_for_message;
 use crate::assets::Companion;
 use crate::formats::foreign::options::MissingAssetMode;
 use crate::system::file::{FileStamp, open_regular_file};
@@ -89,7 +89,11 @@ impl SceneReader<'_> {
         match self.options.missing {
             MissingAssetMode::Error => {
                 let help = "add the file, or use --missing note to render without it".to_owned();
-                self.report_error(span.clone(), format!("{kind} not found: {}", shorten(name)), Some(help));
+                self.report_error(
+                    span.clone(),
+                    format!("{kind} not found: {}", truncate_for_message(name)),
+                    Some(help),
+                );
             }
             MissingAssetMode::Note => {
                 let text = match kind {
@@ -98,7 +102,7 @@ impl SceneReader<'_> {
                     _ => "not found; left out",
                 };
                 self.notes.substitute_changing_lighting(
-                    &format!("{kind} {}", shorten(name)),
+                    &format!("{kind} {}", truncate_for_message(name)),
                     text,
                     span.clone(),
                 );

@@ -6,7 +6,7 @@ use super::graph::{Child, ObjectKind, PluginInstance};
 use super::property::{PropertyValue, SpectrumValue};
 use super::reader::{ColorRole, ColorSource, NumberSource, SceneReader, luminance};
 use super::settings::span_of;
-use super::xml::shorten;
+use super::xml::truncate_for_message;
 use crate::assets::Companion;
 use crate::formats::foreign::spectra::{
     SampledSpectrum, blackbody_radiance, emission_color, equal_energy_emission_color, reflectance_color,
@@ -16,7 +16,7 @@ use crate::math::DVec3;
 
 impl<'a> SceneReader<'a> {
     /// Returns a color or texture. `default` is a gray level.
-    pub(super) fn color(
+    pub(super) fn color_or_texture(
         &mut self,
         object: &'a PluginInstance,
         name: &str,
@@ -24,7 +24,7 @@ impl<'a> SceneReader<'a> {
         default: f64,
     ) -> ColorSource {
         if let Some(child) = object.named_child(name) {
-            return self.color_of_child(child, role);
+            return self.color_or_texture_of_child(child, role);
         }
         let Some(property) = object.property(name) else {
             return ColorSource::Constant(DVec3::splat(default));
@@ -35,19 +35,19 @@ impl<'a> SceneReader<'a> {
             PropertyValue::Rgb(color) => Some(*color),
             PropertyValue::Spectrum(spectrum) => self.spectrum_color(spectrum, role, &property.span),
             other => {
-                self.wrong_type(&property.span, name, "a color", other);
+                self.report_wrong_type(&property.span, name, "a color", other);
                 None
             }
         };
         let color = color.unwrap_or(DVec3::splat(default));
         if color.min_element() < 0.0 {
-            let subject = format!("a negative `{}`", shorten(name));
+            let subject = format!("a negative `{}`", truncate_for_message(name));
             self.notes.substitute_changing_lighting(&subject, "replaced by 0", property.span.clone());
         }
         ColorSource::Constant(color.max(DVec3::ZERO))
     }
 
-    fn color_of_child(&mut self, child: &Child, role: ColorRole) -> ColorSource {
+    fn color_or_texture_of_child(&mut self, child: &Child, role: ColorRole) -> ColorSource {
         let object = self.object_by_index(child.target);
         match object.kind {
             ObjectKind::Texture
@@ -81,7 +81,7 @@ impl<'a> SceneReader<'a> {
         let name = if object.property("color").is_some() { "color" } else { "value" };
         match object.property(name).map(|property| &property.value) {
             Some(PropertyValue::Vector(vector)) => *vector,
-            Some(_) | None => match self.color(object, name, ColorRole::Unbounded, 0.5) {
+            Some(_) | None => match self.color_or_texture(object, name, ColorRole::Unbounded, 0.5) {
                 ColorSource::Constant(color) => color,
                 ColorSource::Texture(_) => DVec3::splat(0.5),
             },
@@ -100,7 +100,7 @@ impl<'a> SceneReader<'a> {
                 // In Mitsuba's RGB mode, an explicit `uniform` plugin is gray.
                 DVec3::splat(value)
             }
-            "srgb" | "rgb" => constant(self.color(
+            "srgb" | "rgb" => constant(self.color_or_texture(
                 object,
                 if object.property("color").is_some() { "color" } else { "value" },
                 role,
@@ -108,7 +108,7 @@ impl<'a> SceneReader<'a> {
             )),
             "d65" => {
                 let scale = self.float(object, "scale").unwrap_or(1.0);
-                let color = constant(self.color(object, "color", ColorRole::Reflectance, 1.0));
+                let color = constant(self.color_or_texture(object, "color", ColorRole::Reflectance, 1.0));
                 color * scale
             }
             "blackbody" => {
@@ -118,7 +118,7 @@ impl<'a> SceneReader<'a> {
             }
             "regular" | "irregular" => self.tabulated_spectrum(object, role),
             _ => {
-                self.unknown_plugin(
+                self.report_unknown_plugin(
                     object,
                     "spectrum",
                     &["uniform", "srgb", "d65", "blackbody", "regular", "irregular"],
@@ -204,8 +204,11 @@ impl<'a> SceneReader<'a> {
     pub(super) fn fraction(&mut self, object: &'a PluginInstance, name: &str, default: f64) -> NumberSource {
         match self.number_or_texture(object, name, default) {
             NumberSource::Constant(number) if !(0.0..=1.0).contains(&number) => {
-                let subject =
-                    format!("`{}` of `{}` outside of 0 to 1", shorten(name), shorten(&object.plugin));
+                let subject = format!(
+                    "`{}` of `{}` outside of 0 to 1",
+                    truncate_for_message(name),
+                    truncate_for_message(&object.plugin)
+                );
                 let limited = number.clamp(0.0, 1.0);
                 self.notes.substitute_changing_lighting(
                     &subject,
@@ -226,7 +229,7 @@ impl<'a> SceneReader<'a> {
         default: f64,
     ) -> NumberSource {
         if let Some(child) = object.named_child(name) {
-            return match self.color_of_child(child, ColorRole::Reflectance) {
+            return match self.color_or_texture_of_child(child, ColorRole::Reflectance) {
                 ColorSource::Constant(color) => NumberSource::Constant(luminance(color)),
                 ColorSource::Texture(texture) => NumberSource::Texture(texture),
             };
@@ -238,7 +241,7 @@ impl<'a> SceneReader<'a> {
             PropertyValue::Spectrum(SpectrumValue::Uniform(number)) => *number,
             PropertyValue::Rgb(color) => luminance(*color),
             other => {
-                self.wrong_type(&property.span, name, "a number or a texture", other);
+                self.report_wrong_type(&property.span, name, "a number or a texture", other);
                 default
             }
         })

@@ -3,7 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use super::graph::PluginInstance;
-use super::material_key::UvConvention;
+use super::material_key::UvFlips;
 use super::reader::SceneReader;
 use super::shapes::ShapeTarget;
 use crate::formats::foreign::meshes::MeshData;
@@ -24,7 +24,7 @@ const CAP_RINGS: u32 = 8;
 type ControlPoint = DVec4;
 
 /// A point on the center line of a tube.
-struct CenterPoint {
+struct SplinePoint {
     center: DVec3,
     radius: f64,
     /// First and second derivative of the center, and the first one of the radius.
@@ -55,7 +55,7 @@ fn parse_curves(text: &str, matrix: &DMat4) -> Option<Vec<Vec<ControlPoint>>> {
 }
 
 /// Evaluates a segment of a uniform cubic B-spline.
-fn spline_point(points: &[ControlPoint; 4], t: f64) -> CenterPoint {
+fn spline_point(points: &[ControlPoint; 4], t: f64) -> SplinePoint {
     let sum = |weights: [f64; 4]| -> DVec4 {
         weights.iter().zip(points).map(|(weight, point)| *weight * *point).sum()
     };
@@ -63,7 +63,7 @@ fn spline_point(points: &[ControlPoint; 4], t: f64) -> CenterPoint {
     let value = sum([s * s * s, 3.0 * t3 - 6.0 * t2 + 4.0, -3.0 * t3 + 3.0 * t2 + 3.0 * t + 1.0, t3]) / 6.0;
     let first = sum([-s * s, 3.0 * t2 - 4.0 * t, -3.0 * t2 + 2.0 * t + 1.0, t2]) / 2.0;
     let second = sum([s, 3.0 * t - 2.0, 1.0 - 3.0 * t, t]);
-    CenterPoint {
+    SplinePoint {
         center: value.truncate(),
         radius: value.w,
         tangent: first.truncate(),
@@ -73,7 +73,7 @@ fn spline_point(points: &[ControlPoint; 4], t: f64) -> CenterPoint {
 }
 
 /// Mitsuba's frame around a tangent: the directions at a quarter turn and at 0.
-fn frame(tangent: DVec3) -> [DVec3; 2] {
+fn frame_around_tangent(tangent: DVec3) -> [DVec3; 2] {
     let guide = DVec3::Z - tangent * tangent.z;
     let quarter = guide.try_normalize().unwrap_or(DVec3::Y);
     [quarter, quarter.cross(tangent)]
@@ -87,7 +87,7 @@ fn mean_width_radius_factor() -> f64 {
 
 /// The direction around a tube at a texture coordinate.
 fn direction_around(tangent: DVec3, u: f64) -> DVec3 {
-    let [quarter, first] = frame(tangent);
+    let [quarter, first] = frame_around_tangent(tangent);
     first * libm::cos(TAU * u) + quarter * libm::sin(TAU * u)
 }
 
@@ -103,7 +103,7 @@ fn spline_segment_tube(points: &[ControlPoint; 4]) -> MeshData {
 }
 
 /// One segment of a linear curve: a cone that touches the spheres at its ends.
-fn linear_segment([start, end]: [ControlPoint; 2]) -> MeshData {
+fn linear_segment_tube([start, end]: [ControlPoint; 2]) -> MeshData {
     let between = end.truncate() - start.truncate();
     let axis = between.normalize_or(DVec3::Z);
     let lift = ((start.w - end.w) / between.length().max(1e-300)).clamp(-1.0, 1.0);
@@ -142,7 +142,7 @@ fn tubes(curves: &[Vec<ControlPoint>], is_spline: bool) -> Option<MeshData> {
     for (index, (number, window)) in windows.enumerate() {
         let mut segment = match *window {
             [a, b, c, d] => spline_segment_tube(&[a, b, c, d]),
-            [a, b] => linear_segment([a, b]),
+            [a, b] => linear_segment_tube([a, b]),
             _ => return None,
         };
         if !is_spline && number > 0 {
@@ -168,7 +168,7 @@ impl<'a> SceneReader<'a> {
             return false;
         };
         let Some(path) = self.asset_path(name, &span, "curves") else { return false };
-        let Some(material) = self.shape_material(object, UvConvention::default()) else { return false };
+        let Some(material) = self.shape_material(object, UvFlips::default()) else { return false };
         let bytes = self.read_watched_file(&path, MAX_BYTES);
         let text = bytes.and_then(|bytes| String::from_utf8(bytes).ok());
         let Some(curves) = text.and_then(|text| parse_curves(&text, &matrix)) else {
@@ -225,7 +225,7 @@ mod tests {
 
     #[test]
     fn linear_segments_touch_their_spheres() {
-        let mesh = linear_segment([DVec4::new(0.0, 0.0, 0.0, 1.0), DVec4::new(0.0, 0.0, 4.0, 0.5)]);
+        let mesh = linear_segment_tube([DVec4::new(0.0, 0.0, 0.0, 1.0), DVec4::new(0.0, 0.0, 4.0, 0.5)]);
         let (low, high) = mesh
             .positions
             .iter()
@@ -241,7 +241,7 @@ mod tests {
     #[test]
     fn joints_belong_to_the_previous_segment() {
         let points = [0.0, 1.0, 3.0].map(|x| DVec4::new(x, 0.0, 0.0, 0.25));
-        let one = linear_segment([points[0], points[1]]);
+        let one = linear_segment_tube([points[0], points[1]]);
         let is_start = |vertex: &u32| one.uvs[*vertex as usize].y < 0.5;
         let cap = one.triangles.iter().filter(|triangle| triangle.iter().all(is_start)).count();
         assert!(cap > 0);

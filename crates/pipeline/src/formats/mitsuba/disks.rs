@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::graph::PluginInstance;
-use super::material_key::UvConvention;
+use super::material_key::UvFlips;
 use super::reader::SceneReader;
 use super::shapes::ShapeTarget;
 use crate::formats::foreign::meshes::MeshData;
@@ -37,7 +37,7 @@ impl<'a> SceneReader<'a> {
     pub(super) fn add_disk(&mut self, object: &'a PluginInstance, target: ShapeTarget<'_>) -> bool {
         let Some(matrix) = self.shape_transform(object) else { return false };
         let is_flipped = self.boolean(object, "flip_normals", false);
-        let Some(material) = self.shape_material(object, UvConvention::default()) else { return false };
+        let Some(material) = self.shape_material(object, UvFlips::default()) else { return false };
         let normal = if is_flipped { DVec3::NEG_Z } else { DVec3::Z };
         if self.shape_uses_coordinates(object) {
             return self.add_generated_mesh(polar_disk(normal), object, target, material, &matrix);

@@ -6,10 +6,10 @@ use super::graph::PluginInstance;
 use super::reader::{ColorRole, ColorSource, SceneReader};
 use super::settings::span_of;
 use super::textures::extension;
-use super::xml::shorten;
+use super::xml::truncate_for_message;
 use crate::formats::foreign::import::TableEntries;
 use crate::formats::foreign::transform::linear_part;
-use crate::formats::rounding::{shorten as shorten_number, shorten_color};
+use crate::formats::rounding::{shorten_color, shorten_number};
 use crate::math::{DMat3, DMat4, DVec3};
 use crate::scene::BuiltValue;
 
@@ -53,7 +53,7 @@ impl<'a> SceneReader<'a> {
             "sunsky" | "sky" | "sun" | "timed_sunsky" => self.add_sky(object),
             "projector" => self.add_projector(object),
             "directionalarea" | "collimated" => self.refuse(object, "collimated light"),
-            _ => self.unknown_plugin(object, "emitter", &KNOWN_EMITTERS),
+            _ => self.report_unknown_plugin(object, "emitter", &KNOWN_EMITTERS),
         }
         self.report_unused(index);
         self.report_unused_children(index);
@@ -61,10 +61,10 @@ impl<'a> SceneReader<'a> {
 
     /// Returns the color of a light. Replaces textures with white and reports them.
     fn light_color(&mut self, object: &'a PluginInstance, name: &str) -> DVec3 {
-        match self.color(object, name, ColorRole::Emission, 1.0) {
+        match self.color_or_texture(object, name, ColorRole::Emission, 1.0) {
             ColorSource::Constant(color) => color,
             ColorSource::Texture(_) => {
-                let subject = format!("a texture in `{}`", shorten(&object.plugin));
+                let subject = format!("a texture in `{}`", truncate_for_message(&object.plugin));
                 self.notes.substitute_changing_lighting(&subject, "replaced by white", span_of(object, name));
                 DVec3::ONE
             }
@@ -85,7 +85,7 @@ impl<'a> SceneReader<'a> {
 
     fn add_light_id_comment(&mut self, object: &'a PluginInstance) {
         if let Some(id) = &object.id {
-            self.document.add_comment_below_header(shorten(id));
+            self.document.add_comment_below_header(truncate_for_message(id));
         }
     }
 
@@ -172,7 +172,7 @@ impl<'a> SceneReader<'a> {
             let help = format!("convert it to one of {}", known.join(", "));
             return self.report_error(
                 span,
-                format!("glimt cannot read .{} images", shorten(&kind)),
+                format!("glimt cannot read .{} images", truncate_for_message(&kind)),
                 Some(help),
             );
         }
@@ -237,7 +237,7 @@ impl<'a> SceneReader<'a> {
             "sun" => sky_scale = 0.0,
             _ => {}
         }
-        let ground = match self.color(
+        let ground = match self.color_or_texture(
             object,
             "albedo",
             ColorRole::Reflectance,

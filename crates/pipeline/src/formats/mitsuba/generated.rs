@@ -8,7 +8,7 @@ use super::shapes::ShapeTarget;
 use crate::formats::foreign::meshes::MeshData;
 use crate::formats::foreign::transform::matrix_value;
 use crate::math::DMat4;
-use crate::scene::GeneratedFile;
+use crate::scene::InMemoryFile;
 
 impl<'a> SceneReader<'a> {
     /// Adds a file that exists only in memory, and returns the value of the key `file`.
@@ -27,7 +27,7 @@ impl<'a> SceneReader<'a> {
             }
         };
         let bytes: Arc<[u8]> = bytes.into();
-        self.document.add_generated_file(name.clone(), GeneratedFile { bytes, hash });
+        self.document.add_in_memory_file(name.clone(), InMemoryFile { bytes, hash });
         self.generated_names.insert(hash, name.clone());
         name
     }

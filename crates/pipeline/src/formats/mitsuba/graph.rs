@@ -6,7 +6,7 @@ use std::ops::Range;
 
 use super::property::{PropertyValue, SpectrumValue, TransformValue};
 use super::values::{self, ValueError, parse_float, parse_numbers, parse_point, to_snake_case_if_old};
-use super::xml::{Attribute, Element, MAX_ERRORS, shorten};
+use super::xml::{Attribute, Element, MAX_ERRORS, truncate_for_message};
 use crate::control::CancelToken;
 use crate::math::{DMat4, DVec3};
 use crate::scene::SourceFiles;
@@ -17,7 +17,7 @@ use crate::scene::nearest::nearest_name;
 const MAX_PROPERTIES: usize = 1000;
 
 /// Index of an object in the graph.
-pub(super) type ObjectIndex = usize;
+pub(super) type NodeIndex = usize;
 
 /// Kinds of objects, named after their XML elements.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -107,7 +107,7 @@ pub(super) struct Property {
 #[derive(Clone, Debug)]
 pub(super) struct Child {
     pub(super) name: Option<String>,
-    pub(super) target: ObjectIndex,
+    pub(super) target: NodeIndex,
     pub(super) span: Range<usize>,
     pub(super) is_used: Cell<bool>,
 }
@@ -137,19 +137,19 @@ pub(super) struct SceneGraph {
 /// Builds the graph from the elements of a scene.
 pub(super) struct GraphBuilder<'a> {
     graph: SceneGraph,
-    ids: HashMap<String, ObjectIndex>,
+    ids: HashMap<String, NodeIndex>,
     /// References to resolve when all objects are known.
-    references: Vec<Reference>,
+    references: Vec<UnresolvedReference>,
     files: &'a SourceFiles,
     pub(super) errors: Vec<Diagnostic>,
     /// The last object with too many properties.
-    overfull: Option<ObjectIndex>,
+    overfull: Option<NodeIndex>,
     token: &'a CancelToken,
 }
 
 /// An unresolved reference.
-struct Reference {
-    parent: ObjectIndex,
+struct UnresolvedReference {
+    parent: NodeIndex,
     /// Index in the parent's children.
     child: usize,
     id: String,
@@ -157,7 +157,7 @@ struct Reference {
 }
 
 /// Target of an unresolved reference.
-const UNRESOLVED: ObjectIndex = usize::MAX;
+const UNRESOLVED: NodeIndex = usize::MAX;
 
 impl<'a> GraphBuilder<'a> {
     pub(super) fn new(files: &'a SourceFiles, token: &'a CancelToken) -> Self {
@@ -177,15 +177,15 @@ impl<'a> GraphBuilder<'a> {
         self.add_object(root, ObjectKind::Scene);
         self.resolve_references();
         if self.errors.is_empty() {
-            self.report_cycles();
+            self.report_first_cycle();
         }
         if self.errors.is_empty() { Ok(self.graph) } else { Err(self.errors) }
     }
 
-    fn add_object(&mut self, element: &Element, kind: ObjectKind) -> Option<ObjectIndex> {
+    fn add_object(&mut self, element: &Element, kind: ObjectKind) -> Option<NodeIndex> {
         let plugin = element.attribute("type");
         if plugin.is_none() && kind != ObjectKind::Scene {
-            let help = format!("write <{} type=\"…\">", shorten(&element.tag));
+            let help = format!("write <{} type=\"…\">", truncate_for_message(&element.tag));
             self.report_error(element.span.clone(), "the attribute `type` is missing", Some(help));
             return None;
         }
@@ -197,7 +197,7 @@ impl<'a> GraphBuilder<'a> {
             && self.ids.insert(id.clone(), index).is_some()
         {
             let span = element.attribute("id").map_or(element.span.clone(), |one| one.span.clone());
-            self.report_error(span, format!("the id `{}` is used twice", shorten(id)), None);
+            self.report_error(span, format!("the id `{}` is used twice", truncate_for_message(id)), None);
         }
         self.graph.objects.push(PluginInstance {
             kind,
@@ -209,16 +209,16 @@ impl<'a> GraphBuilder<'a> {
             is_old: element.is_old,
         });
         for child in &element.children {
-            self.add_member(index, child);
+            self.add_child_or_property(index, child);
         }
         if element.is_old {
-            self.upgrade(index);
+            self.upgrade_old_properties(index);
         }
         Some(index)
     }
 
     /// Adds a nested object, a reference or a property to an object.
-    fn add_member(&mut self, parent: ObjectIndex, element: &Element) {
+    fn add_child_or_property(&mut self, parent: NodeIndex, element: &Element) {
         if self.token.check_pause_and_cancel().is_err() {
             return;
         }
@@ -247,7 +247,7 @@ impl<'a> GraphBuilder<'a> {
                 let child = children.len();
                 let is_used = Cell::new(false);
                 children.push(Child { name, target: UNRESOLVED, span: span.clone(), is_used });
-                self.references.push(Reference { parent, child, id, span });
+                self.references.push(UnresolvedReference { parent, child, id, span });
             }
             "alias" => {
                 let (Some(id), Some(copy)) =
@@ -269,7 +269,11 @@ impl<'a> GraphBuilder<'a> {
                 let known = OBJECT_TAGS.iter().map(|(name, _)| *name).chain(VALUE_TAGS);
                 let help = nearest_name(tag, known.chain(["include", "default", "path"]));
                 let help = help.map(|near| format!("did you mean <{near}>?"));
-                self.report_error(element.span.clone(), format!("unknown element <{}>", shorten(tag)), help);
+                self.report_error(
+                    element.span.clone(),
+                    format!("unknown element <{}>", truncate_for_message(tag)),
+                    help,
+                );
             }
         }
     }
@@ -278,16 +282,16 @@ impl<'a> GraphBuilder<'a> {
     fn required_attribute<'e>(&mut self, element: &'e Element, name: &str) -> Option<&'e Attribute> {
         let found = element.attribute(name);
         if found.is_none() {
-            let message = format!("<{}> needs the attribute `{name}`", shorten(&element.tag));
+            let message = format!("<{}> needs the attribute `{name}`", truncate_for_message(&element.tag));
             self.report_error(element.span.clone(), message, None);
         }
         found
     }
 
-    fn add_property(&mut self, parent: ObjectIndex, element: &Element) {
+    fn add_property(&mut self, parent: NodeIndex, element: &Element) {
         let Some(name) = self.required_attribute(element, "name") else { return };
         let name = to_snake_case_if_old(&name.value, element.is_old);
-        let value = match self.property_value(element) {
+        let value = match self.parse_property_value(element) {
             Ok(value) => value,
             Err(ValueError { span, message, help }) => return self.report_error(span, message, help),
         };
@@ -302,7 +306,11 @@ impl<'a> GraphBuilder<'a> {
         if let Some(known) = properties.iter_mut().find(|known| known.name == name) {
             // Version 0.6 only warns about duplicates.
             if !element.is_old && known.value != value {
-                return self.report_error(span, format!("`{}` is specified twice", shorten(&name)), None);
+                return self.report_error(
+                    span,
+                    format!("`{}` is specified twice", truncate_for_message(&name)),
+                    None,
+                );
             }
             known.value = value;
             return;
@@ -310,7 +318,7 @@ impl<'a> GraphBuilder<'a> {
         properties.push(Property { name, value, span, is_used: Cell::new(false) });
     }
 
-    fn property_value(&mut self, element: &Element) -> Result<PropertyValue, ValueError> {
+    fn parse_property_value(&mut self, element: &Element) -> Result<PropertyValue, ValueError> {
         match element.tag.as_str() {
             "transform" => Ok(PropertyValue::Transform(values::parse_transform(element)?)),
             "animation" => {
@@ -339,7 +347,7 @@ impl<'a> GraphBuilder<'a> {
                 if let Some(file) = element.attribute("filename") {
                     return Ok(PropertyValue::Spectrum(SpectrumValue::File(file.value.clone())));
                 }
-                values::parse_spectrum(self.required_value_attribute(element)?)
+                values::parse_spectrum_or_rgb(self.required_value_attribute(element)?)
             }
             "tensor" => Err(ValueError {
                 span: element.span.clone(),
@@ -369,13 +377,13 @@ impl<'a> GraphBuilder<'a> {
     fn required_value_attribute<'e>(&self, element: &'e Element) -> Result<&'e Attribute, ValueError> {
         element.attribute("value").ok_or_else(|| ValueError {
             span: element.span.clone(),
-            message: format!("<{}> needs the attribute `value`", shorten(&element.tag)),
+            message: format!("<{}> needs the attribute `value`", truncate_for_message(&element.tag)),
             help: None,
         })
     }
 
     /// Converts properties of versions below 2 to those of Mitsuba 3.
-    fn upgrade(&mut self, index: ObjectIndex) {
+    fn upgrade_old_properties(&mut self, index: NodeIndex) {
         let object = &mut self.graph.objects[index];
         if object.plugin == "diffuse" {
             let old = "diffuse_reflectance";
@@ -408,21 +416,25 @@ impl<'a> GraphBuilder<'a> {
     }
 
     fn resolve_references(&mut self) {
-        for Reference { parent, child, id, span } in std::mem::take(&mut self.references) {
+        for UnresolvedReference { parent, child, id, span } in std::mem::take(&mut self.references) {
             match self.ids.get(&id) {
                 Some(&target) => self.graph.objects[parent].children[child].target = target,
                 None if self.errors.len() >= MAX_ERRORS => return,
                 None => {
                     let near = nearest_name(&id, self.ids.keys().map(String::as_str).take(4096));
                     let help = near.map(|near| format!("did you mean `{near}`?"));
-                    self.report_error(span, format!("no object has the id `{}`", shorten(&id)), help);
+                    self.report_error(
+                        span,
+                        format!("no object has the id `{}`", truncate_for_message(&id)),
+                        help,
+                    );
                 }
             }
         }
     }
 
     /// Reports the first object found that contains itself.
-    fn report_cycles(&mut self) {
+    fn report_first_cycle(&mut self) {
         const NEW: u8 = 0;
         const OPEN: u8 = 1;
         const DONE: u8 = 2;

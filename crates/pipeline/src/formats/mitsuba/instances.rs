@@ -1,9 +1,9 @@
 //! Converts groups and their instances.
 
-use super::graph::{ObjectIndex, ObjectKind, PluginInstance};
+use super::graph::{NodeIndex, ObjectKind, PluginInstance};
 use super::reader::SceneReader;
 use super::shapes::ShapeTarget;
-use super::xml::shorten;
+use super::xml::truncate_for_message;
 
 impl<'a> SceneReader<'a> {
     /// Adds an instance, and its group if it is new.
@@ -16,7 +16,8 @@ impl<'a> SceneReader<'a> {
         };
         let group = self.object_by_index(child.target);
         if group.plugin != "shapegroup" {
-            let message = format!("an instance needs a `shapegroup`, found `{}`", shorten(&group.plugin));
+            let message =
+                format!("an instance needs a `shapegroup`, found `{}`", truncate_for_message(&group.plugin));
             self.report_error(child.span.clone(), message, None);
             return false;
         }
@@ -36,7 +37,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Returns the name of a group, adding it if it is new. Returns `None` if it has no visible shapes.
-    fn add_group_if_new(&mut self, index: ObjectIndex, depth: u32) -> Option<String> {
+    fn add_group_if_new(&mut self, index: NodeIndex, depth: u32) -> Option<String> {
         if let Some(known) = self.groups.get(&index) {
             return known.clone();
         }

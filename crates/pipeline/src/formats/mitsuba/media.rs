@@ -2,7 +2,7 @@
 
 use super::graph::{ObjectKind, PluginInstance};
 use super::reader::{ColorRole, ColorSource, SceneReader};
-use super::xml::shorten;
+use super::xml::truncate_for_message;
 use crate::math::DVec3;
 
 impl<'a> SceneReader<'a> {
@@ -13,15 +13,18 @@ impl<'a> SceneReader<'a> {
         for child in self.children_of_kind(object, ObjectKind::Medium) {
             let medium = self.object_by_index(child.target);
             let is_inside = matches!(child.name.as_deref(), None | Some("interior"));
-            let absorption =
-                if is_inside && self.has_solid_glass(object) { self.pure_absorption(medium) } else { None };
+            let absorption = if is_inside && self.has_solid_glass(object) {
+                self.pure_absorption_coefficient(medium)
+            } else {
+                None
+            };
             match absorption {
                 Some(absorption) => {
                     tint = Some(DVec3::from(absorption.to_array().map(|part| libm::exp(-part))));
                     self.report_unused(child.target);
                 }
                 None => {
-                    let subject = format!("medium `{}`", shorten(&medium.plugin));
+                    let subject = format!("medium `{}`", truncate_for_message(&medium.plugin));
                     self.notes.substitute_changing_lighting(
                         &subject,
                         "light passes it unchanged",
@@ -42,12 +45,16 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Returns the absorption of a medium that does not scatter light.
-    fn pure_absorption(&mut self, medium: &'a PluginInstance) -> Option<DVec3> {
-        let mut color =
-            |name: &str, default: f64| match self.color(medium, name, ColorRole::Unbounded, default) {
-                ColorSource::Constant(color) => Some(color),
-                ColorSource::Texture(_) => None,
-            };
+    fn pure_absorption_coefficient(&mut self, medium: &'a PluginInstance) -> Option<DVec3> {
+        let mut color = |name: &str, default: f64| match self.color_or_texture(
+            medium,
+            name,
+            ColorRole::Unbounded,
+            default,
+        ) {
+            ColorSource::Constant(color) => Some(color),
+            ColorSource::Texture(_) => None,
+        };
         if medium.plugin != "homogeneous" || medium.property("material").is_some() {
             return None;
         }

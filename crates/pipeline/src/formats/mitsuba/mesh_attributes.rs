@@ -5,8 +5,8 @@
 
 use std::path::Path;
 
-use super::graph::{ObjectIndex, ObjectKind, PluginInstance};
-use super::ply::{AttributedMesh, MeshAttribute, attribute, face_attribute, triangle_mesh};
+use super::graph::{NodeIndex, ObjectKind, PluginInstance};
+use super::ply::{AttributedMesh, MeshAttribute, attribute_in_table, face_attribute, triangle_mesh};
 use super::reader::SceneReader;
 use super::shapes::ShapeTarget;
 use super::textures::{MitsubaTextureUse, extension};
@@ -67,7 +67,7 @@ impl<'a> SceneReader<'a> {
     /// Returns how the BSDF of a shape uses the attributes of its mesh. Returns `None` if it does not use them
     /// or if glimt cannot express it.
     fn attribute_use(&mut self, object: &'a PluginInstance) -> Option<AttributeUse> {
-        let mut pending: Vec<ObjectIndex> =
+        let mut pending: Vec<NodeIndex> =
             self.children_of_kind(object, ObjectKind::Bsdf).map(|child| child.target).collect();
         let (mut faces, mut others, mut colors, mut bsdfs) = (0, 0, 0, 0);
         let mut visits = 0;
@@ -111,7 +111,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Reads the attributes of a mesh if its material needs them. The material must be converted next.
-    pub(super) fn prepare_attributes(&mut self, object: &'a PluginInstance, path: &Path) {
+    pub(super) fn read_attributes_if_used(&mut self, object: &'a PluginInstance, path: &Path) {
         self.attributes = None;
         if object.plugin != "ply" || extension(&path.to_string_lossy()) != "ply" {
             return;
@@ -125,7 +125,7 @@ impl<'a> SceneReader<'a> {
         let colors = match usage {
             AttributeUse::Faces if mesh.triangles.len() <= MAX_FACES => Vec::new(),
             AttributeUse::Faces => return,
-            AttributeUse::VertexColors => match attribute(&tables.vertices, "color") {
+            AttributeUse::VertexColors => match attribute_in_table(&tables.vertices, "color") {
                 Some(color) if color.is_color && color.values.iter().all(is_color) => color.values,
                 Some(_) | None => return,
             },
@@ -134,7 +134,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Returns the keys of a texture of an attribute, or `None` if glimt cannot express it.
-    pub(super) fn attribute_keys(
+    pub(super) fn attribute_texture_keys(
         &mut self,
         object: &'a PluginInstance,
         usage: MitsubaTextureUse,

@@ -51,7 +51,7 @@ pub(super) fn read(path: &Path, context: &ForeignReadContext<'_>) -> Result<Fore
 }
 
 /// Converts a scene to a scene file, and copies its meshes and images to `folder`.
-pub(super) fn convert(
+pub(super) fn import_with_assets(
     path: &Path,
     folder: &str,
     context: &ForeignReadContext<'_>,
@@ -60,7 +60,7 @@ pub(super) fn convert(
     let (ForeignScene { document, notes, substitutions, .. }, copies) =
         read_scene(path, Some(folder), context)?;
     let mut files = read_files_to_copy(copies, context.token)?;
-    let generated = document.generated_files().iter();
+    let generated = document.in_memory_files().iter();
     files.extend(generated.map(|(name, file)| (PathBuf::from(name), file.bytes.to_vec())));
     Ok(ImportedScene { document, files, substitutions, notes })
 }
@@ -73,7 +73,7 @@ fn read_scene(
 ) -> Result<(ForeignScene, Vec<CopiedFile>), ForeignError> {
     let ForeignReadContext { options, token, .. } = *context;
     let mut loader = XmlLoader::new(path, &options.defines, token);
-    let root = loader.load_scene(path)?;
+    let root = loader.load_scene_elements(path)?;
     let XmlLoader { reader: sources, errors, folders, .. } = loader;
     let fail = |diagnostics: Vec<Diagnostic>, companions: Vec<Companion>| {
         Err(ForeignError::Scene { diagnostics, companions })
@@ -91,7 +91,7 @@ fn read_scene(
     let mut reader = SceneReader::new(&graph, &sources.files, path, &folders, asset_folder, context);
     reader.document.add_comment_above_next_table(format!("{}, as glimt shows it.", file_name(path)));
     let scene = reader.object_by_index(0);
-    reader.add_settings(scene);
+    reader.add_render_and_camera(scene);
     for child in &scene.children {
         token.check_pause_and_cancel()?;
         match reader.object_by_index(child.target).kind {
@@ -114,7 +114,7 @@ fn read_scene(
             | ObjectKind::Spectrum
             | ObjectKind::Subsurface
             | ObjectKind::Texture
-            | ObjectKind::Volume => reader.report_unreachable_child(scene, child),
+            | ObjectKind::Volume => reader.report_child_if_unreachable(scene, child),
         }
     }
     token.check_pause_and_cancel()?;

@@ -36,11 +36,11 @@ impl PlasticCoat {
             };
         };
         let facets = IsotropicMicrofacets { alpha, is_beckmann };
-        let transmittance = mean_over_hemisphere(|cosine| facets.transmittance(cosine, eta));
+        let transmittance = cosine_weighted_mean(|cosine| facets.transmittance(cosine, eta));
         let internal_reflectance = mitsuba_hemisphere_mean(|cosine| {
             facets.reflectance(cosine, 1.0 / eta, MaskingShadowingForm::Separable)
         });
-        let albedo = mean_over_hemisphere(|cosine| {
+        let albedo = cosine_weighted_mean(|cosine| {
             facets.reflectance(cosine, eta, MaskingShadowingForm::HeightCorrelated)
         });
         Self {
@@ -72,13 +72,13 @@ pub(super) fn remapped_reflectance(kd: f64, coat: &PlasticCoat, is_nonlinear: bo
 }
 
 /// Averages a function of the cosine over a cosine-weighted hemisphere: 2 ∫ f(μ) μ dμ.
-fn mean_over_hemisphere(value: impl Fn(f64) -> f64) -> f64 {
+fn cosine_weighted_mean(value: impl Fn(f64) -> f64) -> f64 {
     const STEPS: u32 = 40;
     let at = |step: u32| value(((f64::from(step) + 0.5) / f64::from(STEPS)).sqrt());
     (0..STEPS).map(at).sum::<f64>() / f64::from(STEPS)
 }
 
-/// Like [`mean_over_hemisphere`], but with Mitsuba's quadrature: 64 cosines from 0 to 1 with equal weights.
+/// Like [`cosine_weighted_mean`], but with Mitsuba's quadrature: 64 cosines from 0 to 1 with equal weights.
 /// The result is up to 1.6 % lower.
 fn mitsuba_hemisphere_mean(value: impl Fn(f64) -> f64) -> f64 {
     const COUNT: u32 = 64;

@@ -24,7 +24,7 @@ pub(super) struct MeshAttribute {
 
 /// Returns an attribute: the properties `NAME_0`, `NAME_1` and so on, or `r`, `g` and `b` for `color`. Only
 /// floating-point numbers are supported, because Mitsuba converts others.
-pub(super) fn attribute(table: &PropertyValueTable, name: &str) -> Option<MeshAttribute> {
+pub(super) fn attribute_in_table(table: &PropertyValueTable, name: &str) -> Option<MeshAttribute> {
     let numbered = [0, 1, 2].map(|index| format!("{name}_{index}"));
     let numbered = numbered.each_ref().map(String::as_str);
     let columns = table
@@ -45,7 +45,7 @@ pub(super) fn attribute(table: &PropertyValueTable, name: &str) -> Option<MeshAt
 
 /// Returns an attribute of the faces.
 pub(super) fn face_attribute(tables: &PlyTables, name: &str) -> Option<MeshAttribute> {
-    attribute(&tables.faces, name).filter(|found| found.values.len() == tables.triangles.len())
+    attribute_in_table(&tables.faces, name).filter(|found| found.values.len() == tables.triangles.len())
 }
 
 /// Returns the mesh, or `None` if it has no triangles. Its normals are empty if the file has none.
@@ -106,7 +106,7 @@ mod tests {
         }
         let mesh = triangle_mesh(&tables).expect("a mesh");
         assert_eq!((mesh.positions[2], mesh.triangles[0]), (DVec3::Y * 2.0, [0, 1, 2]));
-        let color = attribute(&tables.vertices, "color").expect("an attribute");
+        let color = attribute_in_table(&tables.vertices, "color").expect("an attribute");
         assert_eq!((color.is_color, color.values[0]), (true, DVec3::new(1.0, 0.0, 0.5)));
         let weight = face_attribute(&tables, "weight").expect("an attribute");
         assert_eq!((weight.is_color, &weight.values[..]), (false, &[DVec3::splat(0.25)][..]));

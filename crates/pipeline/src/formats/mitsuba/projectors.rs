@@ -5,8 +5,8 @@
 
 use std::f64::consts::PI;
 
-use super::graph::{ObjectIndex, ObjectKind, PluginInstance};
-use super::material_key::UvConvention;
+use super::graph::{NodeIndex, ObjectKind, PluginInstance};
+use super::material_key::UvFlips;
 use super::reader::{ColorRole, ColorSource, SceneReader};
 use super::settings::FilmWindow;
 use super::textures::{MitsubaTextureUse, extension, is_float_image};
@@ -14,7 +14,7 @@ use crate::assets::Companion;
 use crate::assets::image::{ColorEncoding, ColorTransferFunction, ImageLimits, load_and_hash};
 use crate::control::ignore_progress;
 use crate::formats::foreign::pixels::Pixels;
-use crate::formats::rounding::{shorten as shorten_number, shorten_color};
+use crate::formats::rounding::{shorten_color, shorten_number};
 use crate::math::{DMat4, DVec2, DVec3, Vec3};
 use crate::scene::BuiltValue;
 use crate::system::file::FileStamp;
@@ -72,7 +72,7 @@ struct ProjectedImage {
 /// Compensates for the cos³ falloff of the irradiance on a plane, so that the plane shows the image. Divides
 /// the image by cos³ relative to the corners, and scales it to a maximum of 1; the scale becomes the factor.
 /// `half` contains the tangents of half the angles of view.
-fn equalize(image: &Pixels, half: DVec2) -> ProjectedImage {
+fn compensate_cosine_falloff(image: &Pixels, half: DVec2) -> ProjectedImage {
     let peak = image.values.iter().fold(Vec3::splat(1e-30), |peak, value| peak.max(*value)).as_dvec3();
     let (width, height) = (image.width.max(MIN_PIXELS), image.height.max(MIN_PIXELS));
     let wrap = |index: i64, count: usize| Some(index.rem_euclid(count as i64) as usize);
@@ -155,7 +155,7 @@ impl<'a> SceneReader<'a> {
     pub(super) fn add_spot_texture(
         &mut self,
         object: &'a PluginInstance,
-        texture: ObjectIndex,
+        texture: NodeIndex,
         cutoff: f64,
     ) -> bool {
         let bitmap = self.object_by_index(texture);
@@ -166,7 +166,7 @@ impl<'a> SceneReader<'a> {
             return false;
         }
         let Some(frame) = self.pane_frame(object) else { return false };
-        let Some(name) = self.find_or_add_texture(texture, MitsubaTextureUse::Color, UvConvention::default())
+        let Some(name) = self.find_or_add_texture(texture, MitsubaTextureUse::Color, UvFlips::default())
         else {
             return false;
         };
@@ -177,7 +177,7 @@ impl<'a> SceneReader<'a> {
 
     /// Returns the irradiance of a projector, from the top row.
     fn projector_image(&mut self, object: &'a PluginInstance) -> Option<Pixels> {
-        match self.color(object, "irradiance", ColorRole::Emission, 1.0) {
+        match self.color_or_texture(object, "irradiance", ColorRole::Emission, 1.0) {
             ColorSource::Constant(color) => {
                 Some(Pixels { width: 1, height: 1, values: vec![color.as_vec3()] })
             }
@@ -227,7 +227,7 @@ impl<'a> SceneReader<'a> {
             return self.refuse(object, "projectors with so wide angles");
         }
         let scale = self.float(object, "scale").unwrap_or(1.0).max(0.0);
-        let ProjectedImage { pixels, factor } = equalize(&image, half);
+        let ProjectedImage { pixels, factor } = compensate_cosine_falloff(&image, half);
         let secant = libm::sqrt(1.0 + half.length_squared());
         let intensity = factor * scale * PI * (secant * secant * secant);
         let file = self.add_generated_file("projection", "pfm", pixels.encode_pfm(false));
@@ -274,7 +274,7 @@ mod tests {
     fn images_are_equalized_by_the_cosine() {
         let image = Pixels { width: 1, height: 1, values: vec![Vec3::new(3.0, 1.0, 0.0)] };
         let half = DVec2::new(2.0, 1.0);
-        let ProjectedImage { pixels, factor } = equalize(&image, half);
+        let ProjectedImage { pixels, factor } = compensate_cosine_falloff(&image, half);
         assert_eq!(factor.x, 3.0);
         let (first, middle) = (pixels.get(0, 0), pixels.get(MIN_PIXELS / 2, MIN_PIXELS / 2));
         assert!(first.x > 0.98 && first.x <= 1.0 && (first.y - first.x).abs() < 1e-6, "{first}");

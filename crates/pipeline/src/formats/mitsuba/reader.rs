@@ -4,12 +4,12 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use super::graph::{Child, ObjectIndex, ObjectKind, PluginInstance, SceneGraph};
+use super::graph::{Child, NodeIndex, ObjectKind, PluginInstance, SceneGraph};
 use super::material_key::{BlendPartKey, MaterialKey};
 use super::plastic::PlasticCoat;
 use super::ply::AttributedMesh;
 use super::property::{PropertyValue, SpectrumValue, TransformValue};
-use super::xml::{MAX_ERRORS, shorten};
+use super::xml::{MAX_ERRORS, truncate_for_message};
 use crate::assets::Companion;
 use crate::control::CancelToken;
 use crate::formats::ForeignReadContext;
@@ -21,7 +21,7 @@ use crate::math::{DMat4, DVec3};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::nearest::nearest_name;
 use crate::scene::{SceneDocumentBuilder, SourceFiles};
-use crate::stages::containers::GltfContainers;
+use crate::stages::containers::OpenAssetFiles;
 
 /// Maximum number of shapes and instances. Tests use a small limit.
 const MAX_SHAPES: usize = if cfg!(test) { 20_000 } else { 4_000_000 };
@@ -43,14 +43,14 @@ pub(super) enum ColorRole {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum ColorSource {
     Constant(DVec3),
-    Texture(ObjectIndex),
+    Texture(NodeIndex),
 }
 
 /// A constant number or a texture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum NumberSource {
     Constant(f64),
-    Texture(ObjectIndex),
+    Texture(NodeIndex),
 }
 
 /// Converts a scene graph to a scene document.
@@ -64,7 +64,7 @@ pub(super) struct SceneReader<'a> {
     pub(super) options: &'a ForeignOptions,
     pub(super) token: &'a CancelToken,
     /// Loads meshes.
-    pub(super) containers: &'a GltfContainers,
+    pub(super) containers: &'a OpenAssetFiles,
     /// Folder to which an import copies the assets, or `None` if they stay in place.
     pub(super) asset_folder: Option<&'a str>,
     pub(super) errors: Vec<Diagnostic>,
@@ -81,7 +81,7 @@ pub(super) struct SceneReader<'a> {
     /// Names of the converted textures, by their formatted table entries.
     pub(super) textures: HashMap<String, String>,
     /// Names of the groups in the document. `None` marks groups without visible shapes.
-    pub(super) groups: HashMap<ObjectIndex, Option<String>>,
+    pub(super) groups: HashMap<NodeIndex, Option<String>>,
     /// Names of the files that an import writes, by source path.
     pub(super) asset_names: BTreeMap<PathBuf, String>,
     pub(super) used_asset_names: HashSet<String>,
@@ -94,7 +94,7 @@ pub(super) struct SceneReader<'a> {
     /// Position of the camera.
     pub(super) camera_position: Option<DVec3>,
     /// Objects whose unused properties have been reported.
-    pub(super) reported_unused: HashSet<ObjectIndex>,
+    pub(super) reported_unused: HashSet<NodeIndex>,
     pub(super) has_environment: bool,
     /// Name of the black material, if the document has one.
     pub(super) black: Option<String>,
@@ -107,7 +107,7 @@ pub(super) struct SceneReader<'a> {
     /// Inspected properties of files, by path and part.
     pub(super) inspected_files: HashMap<(PathBuf, Option<i64>), bool>,
     /// Objects whose nested objects were reported as unused.
-    pub(super) reported_children: HashSet<ObjectIndex>,
+    pub(super) reported_children: HashSet<NodeIndex>,
     /// Number of materials in the document.
     pub(super) material_count: usize,
     /// Number of shapes converted, including those that contain shapes.
@@ -200,12 +200,12 @@ impl<'a> SceneReader<'a> {
     /// Whether a predicate is true for any of the objects or any object in them.
     pub(super) fn any_nested_object_satisfies(
         &self,
-        objects: impl IntoIterator<Item = ObjectIndex>,
+        objects: impl IntoIterator<Item = NodeIndex>,
         is_found: impl Fn(&PluginInstance) -> bool,
     ) -> bool {
-        let mut pending: Vec<ObjectIndex> = objects.into_iter().collect();
+        let mut pending: Vec<NodeIndex> = objects.into_iter().collect();
         // References can lead to the same object on many paths.
-        let mut visited: HashSet<ObjectIndex> = HashSet::new();
+        let mut visited: HashSet<NodeIndex> = HashSet::new();
         while let Some(index) = pending.pop() {
             if !visited.insert(index) {
                 continue;
@@ -220,7 +220,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Returns an object. The result does not borrow the reader.
-    pub(super) fn object_by_index(&self, index: ObjectIndex) -> &'a PluginInstance {
+    pub(super) fn object_by_index(&self, index: NodeIndex) -> &'a PluginInstance {
         &self.graph.objects[index]
     }
 
@@ -239,13 +239,13 @@ impl<'a> SceneReader<'a> {
 
     /// Reports an error for a feature that glimt neither supports nor substitutes.
     pub(super) fn refuse(&mut self, object: &PluginInstance, what: &str) {
-        let message = format!("glimt does not render {what} (`{}`)", shorten(&object.plugin));
+        let message = format!("glimt does not render {what} (`{}`)", truncate_for_message(&object.plugin));
         let help = "remove it, or render this scene with Mitsuba".to_owned();
         self.report_error(object.span.clone(), message, Some(help));
     }
 
     /// Reports an unknown plugin, and suggests a similar name from `known`.
-    pub(super) fn unknown_plugin(&mut self, object: &PluginInstance, kind: &str, known: &[&str]) {
+    pub(super) fn report_unknown_plugin(&mut self, object: &PluginInstance, kind: &str, known: &[&str]) {
         let near = nearest_name(&object.plugin, known.iter().copied());
         let help = match near {
             Some(near) => format!("did you mean `{near}`?"),
@@ -253,19 +253,20 @@ impl<'a> SceneReader<'a> {
         };
         self.report_error(
             object.span.clone(),
-            format!("unknown {kind} `{}`", shorten(&object.plugin)),
+            format!("unknown {kind} `{}`", truncate_for_message(&object.plugin)),
             Some(help),
         );
     }
 
-    pub(super) fn wrong_type(
+    pub(super) fn report_wrong_type(
         &mut self,
         span: &Range<usize>,
         name: &str,
         expected: &str,
         found: &PropertyValue,
     ) {
-        let message = format!("`{}` must be {expected}, found {}", shorten(name), found.type_name());
+        let message =
+            format!("`{}` must be {expected}, found {}", truncate_for_message(name), found.type_name());
         self.report_error(span.clone(), message, None);
     }
 
@@ -277,7 +278,7 @@ impl<'a> SceneReader<'a> {
             PropertyValue::Integer(number) => Some(*number as f64),
             PropertyValue::Spectrum(SpectrumValue::Uniform(number)) => Some(*number),
             other => {
-                self.wrong_type(&property.span, name, "a float", other);
+                self.report_wrong_type(&property.span, name, "a float", other);
                 None
             }
         }
@@ -290,7 +291,7 @@ impl<'a> SceneReader<'a> {
             PropertyValue::Integer(number) => Some(*number),
             PropertyValue::Float(number) if number.fract() == 0.0 => Some(*number as i64),
             other => {
-                self.wrong_type(&property.span, name, "an integer", other);
+                self.report_wrong_type(&property.span, name, "an integer", other);
                 None
             }
         }
@@ -302,7 +303,7 @@ impl<'a> SceneReader<'a> {
         match &property.value {
             PropertyValue::Boolean(flag) => *flag,
             other => {
-                self.wrong_type(&property.span, name, "a boolean", other);
+                self.report_wrong_type(&property.span, name, "a boolean", other);
                 default
             }
         }
@@ -314,7 +315,7 @@ impl<'a> SceneReader<'a> {
         match &property.value {
             PropertyValue::Text(text) => Some((text, property.span.clone())),
             other => {
-                self.wrong_type(&property.span, name, "a string", other);
+                self.report_wrong_type(&property.span, name, "a string", other);
                 None
             }
         }
@@ -326,7 +327,7 @@ impl<'a> SceneReader<'a> {
         match &property.value {
             PropertyValue::Vector(vector) => Some(*vector),
             other => {
-                self.wrong_type(&property.span, name, "a vector", other);
+                self.report_wrong_type(&property.span, name, "a vector", other);
                 None
             }
         }
@@ -338,7 +339,7 @@ impl<'a> SceneReader<'a> {
         match &property.value {
             PropertyValue::Transform(transform) => Some(*transform),
             other => {
-                self.wrong_type(&property.span, name, "a transform", other);
+                self.report_wrong_type(&property.span, name, "a transform", other);
                 None
             }
         }
@@ -368,7 +369,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Adds a note for each property of an object that has not been read.
-    pub(super) fn report_unused(&mut self, index: ObjectIndex) {
+    pub(super) fn report_unused(&mut self, index: NodeIndex) {
         /// Properties that do not affect glimt's images.
         const IRRELEVANT: [&str; 12] = [
             "name",
@@ -392,7 +393,11 @@ impl<'a> SceneReader<'a> {
             if IRRELEVANT.contains(&property.name.as_str()) {
                 continue;
             }
-            let subject = format!("`{}` of `{}`", shorten(&property.name), shorten(&object.plugin));
+            let subject = format!(
+                "`{}` of `{}`",
+                truncate_for_message(&property.name),
+                truncate_for_message(&object.plugin)
+            );
             self.notes.note(&subject, "ignored", property.span.clone());
         }
     }

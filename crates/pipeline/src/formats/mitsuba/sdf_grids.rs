@@ -4,7 +4,7 @@
 //! cell into six tetrahedra, whose edges meet the surface at the roots of the interpolant.
 
 use super::graph::PluginInstance;
-use super::material_key::UvConvention;
+use super::material_key::UvFlips;
 use super::reader::SceneReader;
 use super::shapes::ShapeTarget;
 use crate::formats::foreign::meshes::MeshData;
@@ -208,7 +208,7 @@ impl<'a> SceneReader<'a> {
             }
         };
         let Some(path) = self.asset_path(name, &span, "grid") else { return false };
-        let Some(material) = self.shape_material(object, UvConvention::default()) else { return false };
+        let Some(material) = self.shape_material(object, UvFlips::default()) else { return false };
         let bytes = self.read_watched_file(&path, MAX_BYTES);
         let Some(grid) = bytes.and_then(|bytes| DistanceGrid::parse(&bytes)) else {
             let help = "glimt reads version 3 of the format with one channel of 32-bit floats".to_owned();

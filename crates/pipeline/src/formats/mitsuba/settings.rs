@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::graph::{Child, ObjectKind, PluginInstance};
 use super::reader::SceneReader;
-use super::xml::shorten;
+use super::xml::truncate_for_message;
 use crate::formats::foreign::transform::{is_mirroring, linear_part};
 use crate::math::{DMat4, DVec3};
 
@@ -74,7 +74,7 @@ impl FilmWindow {
 
     /// Offset of the crop window's center from the film's center, to the right and up, in units of the crop
     /// window's height.
-    fn shift(&self) -> [f64; 2] {
+    fn lens_shift(&self) -> [f64; 2] {
         let offset =
             |axis: usize| self.crop_offset[axis] + self.crop_size[axis] / 2.0 - self.size[axis] / 2.0;
         [offset(0) / self.crop_size[1], -offset(1) / self.crop_size[1]]
@@ -83,7 +83,7 @@ impl FilmWindow {
 
 impl<'a> SceneReader<'a> {
     /// Adds the `[render]` and `[camera]` tables.
-    pub(super) fn add_settings(&mut self, scene: &'a PluginInstance) {
+    pub(super) fn add_render_and_camera(&mut self, scene: &'a PluginInstance) {
         let Some(sensor) = self.select_sensor(scene) else { return };
         let sensor_index = sensor.target;
         let sensor = self.object_by_index(sensor_index);
@@ -134,7 +134,7 @@ impl<'a> SceneReader<'a> {
         let found = by_name.or_else(by_number).copied();
         if found.is_none() {
             let name = |(index, child): (usize, &&Child)| match &self.object_by_index(child.target).id {
-                Some(id) => format!("{} ({})", index + 1, shorten(id)),
+                Some(id) => format!("{} ({})", index + 1, truncate_for_message(id)),
                 None => (index + 1).to_string(),
             };
             let names: Vec<_> = sensors.iter().enumerate().take(20).map(name).collect();
@@ -142,7 +142,7 @@ impl<'a> SceneReader<'a> {
             let span = sensors[0].span.clone();
             self.report_error(
                 span,
-                format!("--sensor: there is no sensor `{}`", shorten(wanted)),
+                format!("--sensor: there is no sensor `{}`", truncate_for_message(wanted)),
                 Some(help),
             );
         }
@@ -159,7 +159,7 @@ impl<'a> SceneReader<'a> {
                 let text = "rendered with the colors of the CIE observer instead of the film's channels";
                 self.notes.substitute_changing_lighting("`specfilm`", text, film.span.clone());
             }
-            _ => self.unknown_plugin(film, "film", &["hdrfilm", "ldrfilm", "specfilm"]),
+            _ => self.report_unknown_plugin(film, "film", &["hdrfilm", "ldrfilm", "specfilm"]),
         }
         for name in ["pixel_format", "component_format", "file_format", "compensate", "banner", "attach_log"]
         {
@@ -231,7 +231,7 @@ impl<'a> SceneReader<'a> {
                 "mitchell"
             }
             _ => {
-                self.unknown_plugin(
+                self.report_unknown_plugin(
                     filter,
                     "filter",
                     &["box", "tent", "gaussian", "mitchell", "catmullrom", "lanczos"],
@@ -330,7 +330,7 @@ impl<'a> SceneReader<'a> {
             _ => {
                 let known =
                     ["path", "direct", "volpath", "aov", "moment", "ptracer", "bdpt", "photonmapper", "sppm"];
-                self.unknown_plugin(integrator, "integrator", &known);
+                self.report_unknown_plugin(integrator, "integrator", &known);
             }
         }
         for name in ["samples_per_pass", "block_size", "spp", "rr_depth"] {
@@ -401,7 +401,7 @@ impl<'a> SceneReader<'a> {
                 return;
             }
             _ => {
-                self.unknown_plugin(
+                self.report_unknown_plugin(
                     sensor,
                     "sensor",
                     &["perspective", "thinlens", "orthographic", "spherical"],
@@ -409,7 +409,7 @@ impl<'a> SceneReader<'a> {
                 return;
             }
         }
-        let [right, upward] = window.shift();
+        let [right, upward] = window.lens_shift();
         let shift = [right + offset[0], upward - offset[1]];
         if shift != [0.0; 2] {
             self.document.set("shift", [if is_mirrored { -shift[0] } else { shift[0] }, shift[1]]);
@@ -452,7 +452,7 @@ impl<'a> SceneReader<'a> {
                 (fov.to_radians(), axis.map_or("x", |(name, _)| name), span)
             }
             None => {
-                let length = self.focal_length(sensor);
+                let length = self.focal_length_in_millimeters(sensor);
                 (2.0 * libm::atan(FILM_DIAGONAL / (2.0 * length)), "diagonal", sensor.span.clone())
             }
         };
@@ -472,14 +472,18 @@ impl<'a> SceneReader<'a> {
             "diagonal" => half / libm::sqrt(1.0 + aspect * aspect),
             other => {
                 let help = "expected x, y, diagonal, smaller or larger".to_owned();
-                self.report_error(span, format!("unknown axis `{}`", shorten(other)), Some(help));
+                self.report_error(
+                    span,
+                    format!("unknown axis `{}`", truncate_for_message(other)),
+                    Some(help),
+                );
                 half
             }
         }
     }
 
     /// Focal length in millimeters, 50 by default.
-    fn focal_length(&mut self, sensor: &'a PluginInstance) -> f64 {
+    fn focal_length_in_millimeters(&mut self, sensor: &'a PluginInstance) -> f64 {
         const DEFAULT: f64 = 50.0;
         let Some((text, span)) = self.text(sensor, "focal_length") else { return DEFAULT };
         let number = text.trim().trim_end_matches("mm").trim().parse::<f64>().ok();

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use super::graph::{Child, ObjectIndex, ObjectKind, PluginInstance};
-use super::material_key::UvConvention;
+use super::graph::{Child, NodeIndex, ObjectKind, PluginInstance};
+use super::material_key::UvFlips;
 use super::placement::{cylinder_matrix, has_normals};
 use super::reader::SceneReader;
 use super::settings::span_of;
@@ -60,7 +60,7 @@ impl ShapeTarget<'_> {
 
 impl<'a> SceneReader<'a> {
     /// Adds a shape. Returns whether anything was added.
-    pub(super) fn add_shape(&mut self, index: ObjectIndex, target: ShapeTarget<'_>) -> bool {
+    pub(super) fn add_shape(&mut self, index: NodeIndex, target: ShapeTarget<'_>) -> bool {
         let object = self.object_by_index(index);
         if !self.count_shape_and_check_limit(object) {
             return false;
@@ -102,7 +102,7 @@ impl<'a> SceneReader<'a> {
                 false
             }
             _ => {
-                self.unknown_plugin(object, "shape", &KNOWN_SHAPES);
+                self.report_unknown_plugin(object, "shape", &KNOWN_SHAPES);
                 false
             }
         };
@@ -124,7 +124,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Returns the name of a shape's material. Returns `None` if the shape is invisible or has errors.
-    pub(super) fn shape_material(&mut self, object: &'a PluginInstance, uv: UvConvention) -> Option<String> {
+    pub(super) fn shape_material(&mut self, object: &'a PluginInstance, uv: UvFlips) -> Option<String> {
         let bsdf: Option<&'a Child> = self.children_of_kind(object, ObjectKind::Bsdf).next();
         if let Some(second) = self.children_of_kind(object, ObjectKind::Bsdf).nth(1) {
             let text = "only the first is used";
@@ -215,7 +215,7 @@ impl<'a> SceneReader<'a> {
         // OBJ files are flipped by default, so that v = 0 is at the top like in images.
         let is_obj = object.plugin == "obj";
         let flips_v = self.boolean(object, "flip_tex_coords", is_obj);
-        let uv = UvConvention { flips_u: false, flips_v };
+        let uv = UvFlips { flips_u: false, flips_v };
         let has_flat_faces = self.boolean(object, "face_normals", false);
         let is_flipped = self.boolean(object, "flip_normals", false);
         let part = self.integer(object, "shape_index");
@@ -224,7 +224,7 @@ impl<'a> SceneReader<'a> {
             self.notes.note("a mesh without area", "skipped", span);
             return false;
         }
-        self.prepare_attributes(object, &path);
+        self.read_attributes_if_used(object, &path);
         let material = self.shape_material(object, uv);
         let attributes = self.attributes.take();
         let Some(material) = material else { return false };
@@ -279,8 +279,7 @@ impl<'a> SceneReader<'a> {
             DVec3::NEG_Y.extend(0.0),
             DVec3::ZERO.extend(1.0),
         );
-        let Some(material) = self.shape_material(object, UvConvention { flips_u: false, flips_v: true })
-        else {
+        let Some(material) = self.shape_material(object, UvFlips { flips_u: false, flips_v: true }) else {
             return false;
         };
         self.start_shape(object, target, "sphere", material);
@@ -316,7 +315,7 @@ impl<'a> SceneReader<'a> {
         let end = self.vector(object, "p1").unwrap_or(DVec3::Z);
         let radius = self.float(object, "radius").unwrap_or(1.0);
         let is_flipped = self.boolean(object, "flip_normals", false);
-        let Some(material) = self.shape_material(object, UvConvention::default()) else { return false };
+        let Some(material) = self.shape_material(object, UvFlips::default()) else { return false };
         let placed = if self.shape_uses_coordinates(object) {
             cylinder_matrix(&matrix, start, end, radius)
         } else {
@@ -362,7 +361,7 @@ impl<'a> SceneReader<'a> {
             (corner(1.0, -1.0) - corner(-1.0, -1.0), corner(-1.0, 1.0) - corner(-1.0, -1.0));
         // A quad's front is on the side of u × v, which a mirroring transform reverses.
         let is_reversed = is_mirroring(&matrix) != is_flipped;
-        let uv = UvConvention { flips_u: is_reversed, flips_v: false };
+        let uv = UvFlips { flips_u: is_reversed, flips_v: false };
         let Some(material) = self.shape_material(object, uv) else { return false };
         self.start_shape(object, target, "quad", material);
         if is_reversed {
@@ -384,7 +383,7 @@ impl<'a> SceneReader<'a> {
         let is_flipped = self.boolean(object, "flip_normals", false);
         object.property("face_normals");
         if !is_flipped && !self.shape_uses_coordinates(object) {
-            let Some(material) = self.shape_material(object, UvConvention::default()) else { return false };
+            let Some(material) = self.shape_material(object, UvFlips::default()) else { return false };
             self.start_shape(object, target, "box", material);
             self.document.set("center", DVec3::ZERO);
             self.document.set("size", DVec3::splat(2.0));
@@ -392,7 +391,7 @@ impl<'a> SceneReader<'a> {
             return true;
         }
         let is_reversed = is_mirroring(&matrix) != is_flipped;
-        let uv = UvConvention { flips_u: !is_reversed, flips_v: false };
+        let uv = UvFlips { flips_u: !is_reversed, flips_v: false };
         let Some(material) = self.shape_material(object, uv) else { return false };
         for face in CUBE_FACES {
             let point = |index: usize| {

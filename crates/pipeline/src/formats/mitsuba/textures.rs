@@ -2,13 +2,13 @@
 
 use std::ops::Range;
 
-use super::graph::{ObjectIndex, ObjectKind, PluginInstance};
-use super::material_key::UvConvention;
+use super::graph::{NodeIndex, ObjectKind, PluginInstance};
+use super::material_key::UvFlips;
 use super::reader::{ColorRole, ColorSource, SceneReader, luminance};
 use super::settings::span_of;
-use super::xml::shorten;
+use super::xml::truncate_for_message;
 use crate::formats::foreign::import::TableEntries;
-use crate::formats::rounding::{shorten as shorten_number, shorten_color};
+use crate::formats::rounding::{shorten_color, shorten_number};
 use crate::math::{DMat4, DVec3};
 use crate::scene::BuiltValue;
 
@@ -28,15 +28,15 @@ const IMAGES: [&str; 14] =
 
 /// An affine map of texture coordinates: a 2 × 2 matrix in rows, then an offset.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct UvMap {
+struct UvAffineMap {
     rows: [[f64; 2]; 2],
     offset: [f64; 2],
 }
 
-impl UvMap {
+impl UvAffineMap {
     /// Combines the shape's convention and the texture's `to_uv`. Images are flipped, because Mitsuba's v = 0
     /// is their top row.
-    fn new(to_uv: &DMat4, uv: UvConvention, is_image: bool) -> Self {
+    fn new(to_uv: &DMat4, uv: UvFlips, is_image: bool) -> Self {
         let flip = |flips: bool| if flips { (-1.0, 1.0) } else { (1.0, 0.0) };
         let [(scale_u, offset_u), (scale_v, offset_v)] = [flip(uv.flips_u), flip(uv.flips_v)];
         let row = |index: usize| {
@@ -86,19 +86,19 @@ impl<'a> SceneReader<'a> {
     /// missing.
     pub(super) fn find_or_add_texture(
         &mut self,
-        index: ObjectIndex,
+        index: NodeIndex,
         usage: MitsubaTextureUse,
-        uv: UvConvention,
+        uv: UvFlips,
     ) -> Option<String> {
-        self.texture_with_factor(index, usage, uv, 1.0)
+        self.find_or_add_scaled_texture(index, usage, uv, 1.0)
     }
 
     /// Like [`Self::find_or_add_texture`], with the colors multiplied by `factor`.
-    pub(super) fn texture_with_factor(
+    pub(super) fn find_or_add_scaled_texture(
         &mut self,
-        index: ObjectIndex,
+        index: NodeIndex,
         usage: MitsubaTextureUse,
-        uv: UvConvention,
+        uv: UvFlips,
         factor: f64,
     ) -> Option<String> {
         let object = self.object_by_index(index);
@@ -110,10 +110,10 @@ impl<'a> SceneReader<'a> {
                 let scale =
                     self.float(object, "scale").or_else(|| self.float(object, "value")).unwrap_or(1.0);
                 self.report_unused(index);
-                return self.texture_with_factor(inner, usage, uv, factor * scale);
+                return self.find_or_add_scaled_texture(inner, usage, uv, factor * scale);
             }
             "mesh_attribute" | "vertexcolors" | "vertex_color" => {
-                if let Some(found) = self.attribute_keys(object, usage) {
+                if let Some(found) = self.attribute_texture_keys(object, usage) {
                     found
                 } else {
                     let text = "replaced by its usual value, gray";
@@ -135,7 +135,7 @@ impl<'a> SceneReader<'a> {
                 return None;
             }
             _ => {
-                self.unknown_plugin(
+                self.report_unknown_plugin(
                     object,
                     "texture",
                     &["bitmap", "checkerboard", "mesh_attribute", "volume", "scale"],
@@ -151,11 +151,11 @@ impl<'a> SceneReader<'a> {
         }
         let wanted = object.id.as_deref().unwrap_or(&wanted).to_owned();
         let spans = [object.span.clone(), span_of(object, "filename")];
-        Some(self.add_texture_table(keys, &wanted, spans))
+        Some(self.find_or_add_texture_table(keys, &wanted, spans))
     }
 
     /// Returns the color of a spectrum that is used in place of a texture.
-    pub(super) fn color_if_spectrum(&mut self, index: ObjectIndex, role: ColorRole) -> Option<DVec3> {
+    pub(super) fn color_if_spectrum(&mut self, index: NodeIndex, role: ColorRole) -> Option<DVec3> {
         let object = self.object_by_index(index);
         match object.kind {
             ObjectKind::Spectrum => Some(self.spectrum_plugin_color(object, role)),
@@ -177,14 +177,14 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Returns the value of a number key that reads a texture.
-    pub(super) fn number_texture(&mut self, index: ObjectIndex, uv: UvConvention) -> Option<BuiltValue> {
+    pub(super) fn number_texture(&mut self, index: NodeIndex, uv: UvFlips) -> Option<BuiltValue> {
         let name = self.find_or_add_texture(index, MitsubaTextureUse::Number, uv)?;
         Some(BuiltValue::Table(vec![("texture", name.into())]))
     }
 
     /// Returns the value of `opacity` for a texture. Selects the red channel if the image may have alpha, which
     /// `opacity` would read: Mitsuba takes the luminance, and masks are gray.
-    pub(super) fn opacity_texture(&mut self, index: ObjectIndex, uv: UvConvention) -> Option<BuiltValue> {
+    pub(super) fn opacity_texture(&mut self, index: NodeIndex, uv: UvFlips) -> Option<BuiltValue> {
         let name = self.find_or_add_texture(index, MitsubaTextureUse::Number, uv)?;
         let mut entries = vec![("texture", name.into())];
         if self.image_may_have_alpha(self.object_by_index(index)) {
@@ -194,11 +194,11 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Returns the value of `roughness`, which is √α, for a texture of α.
-    pub(super) fn roughness_texture(&mut self, index: ObjectIndex, uv: UvConvention) -> Option<BuiltValue> {
+    pub(super) fn roughness_texture(&mut self, index: NodeIndex, uv: UvFlips) -> Option<BuiltValue> {
         let object = self.object_by_index(index);
         if object.plugin == "checkerboard" {
             // Convert both values exactly.
-            let name = self.checkerboard_of_roots(index, uv)?;
+            let name = self.add_square_root_checkerboard(index, uv)?;
             return Some(BuiltValue::Table(vec![("texture", name.into())]));
         }
         let text = "used as √α instead of α";
@@ -207,7 +207,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Returns the value of `bump`.
-    pub(super) fn height_texture(&mut self, index: ObjectIndex, uv: UvConvention) -> Option<BuiltValue> {
+    pub(super) fn height_texture(&mut self, index: NodeIndex, uv: UvFlips) -> Option<BuiltValue> {
         let name = self.find_or_add_texture(index, MitsubaTextureUse::Number, uv)?;
         Some(name.into())
     }
@@ -232,7 +232,7 @@ impl<'a> SceneReader<'a> {
         &mut self,
         object: &'a PluginInstance,
         usage: MitsubaTextureUse,
-        uv: UvConvention,
+        uv: UvFlips,
     ) -> Option<(TableEntries, String)> {
         let Some((name, span)) = self.text(object, "filename") else {
             self.report_error(object.span.clone(), "the texture needs `filename`", None);
@@ -241,7 +241,11 @@ impl<'a> SceneReader<'a> {
         let kind = extension(name);
         if !IMAGES.contains(&kind.as_str()) {
             let help = format!("convert it to one of {}", IMAGES[..12].join(", "));
-            self.report_error(span, format!("glimt cannot read .{} images", shorten(&kind)), Some(help));
+            self.report_error(
+                span,
+                format!("glimt cannot read .{} images", truncate_for_message(&kind)),
+                Some(help),
+            );
             return None;
         }
         let mut keys: TableEntries =
@@ -251,7 +255,11 @@ impl<'a> SceneReader<'a> {
             Some(("nearest", _)) => keys.push(("filter", "nearest".into())),
             Some((other, span)) => {
                 let help = "expected bilinear or nearest".to_owned();
-                self.report_error(span, format!("unknown filter `{}`", shorten(other)), Some(help));
+                self.report_error(
+                    span,
+                    format!("unknown filter `{}`", truncate_for_message(other)),
+                    Some(help),
+                );
             }
         }
         let wrap = self.text(object, "wrap_mode").or_else(|| self.text(object, "wrap_mode_u"));
@@ -261,7 +269,11 @@ impl<'a> SceneReader<'a> {
             Some(("clamp", _)) => keys.push(("wrap", "clamp".into())),
             Some((other, span)) => {
                 let help = "expected repeat, mirror or clamp".to_owned();
-                self.report_error(span, format!("unknown wrap mode `{}`", shorten(other)), Some(help));
+                self.report_error(
+                    span,
+                    format!("unknown wrap mode `{}`", truncate_for_message(other)),
+                    Some(help),
+                );
             }
         }
         for name in ["wrap_mode_v", "max_anisotropy", "cache", "format"] {
@@ -298,10 +310,10 @@ impl<'a> SceneReader<'a> {
         Some((keys, stem.to_owned()))
     }
 
-    fn uv_keys(&mut self, object: &'a PluginInstance, uv: UvConvention, is_image: bool) -> TableEntries {
+    fn uv_keys(&mut self, object: &'a PluginInstance, uv: UvFlips, is_image: bool) -> TableEntries {
         let to_uv =
             self.transform_value(object, "to_uv").map_or(DMat4::IDENTITY, |transform| transform.matrix);
-        let keys = UvMap::new(&to_uv, uv, is_image).keys();
+        let keys = UvAffineMap::new(&to_uv, uv, is_image).keys();
         keys.unwrap_or_else(|| {
             let text = "ignored";
             self.notes.substitute_changing_lighting(
@@ -309,24 +321,28 @@ impl<'a> SceneReader<'a> {
                 text,
                 span_of(object, "to_uv"),
             );
-            UvMap::new(&DMat4::IDENTITY, uv, is_image).keys().unwrap_or_default()
+            UvAffineMap::new(&DMat4::IDENTITY, uv, is_image).keys().unwrap_or_default()
         })
     }
 
     /// Colors of a checkerboard, which may not be textures themselves.
     pub(super) fn checker_colors(&mut self, object: &'a PluginInstance) -> [DVec3; 2] {
-        let mut color =
-            |name: &str, default: f64| match self.color(object, name, ColorRole::Reflectance, default) {
-                ColorSource::Constant(color) => color,
-                ColorSource::Texture(_) => {
-                    self.notes.substitute_changing_lighting(
-                        "a texture in a checkerboard",
-                        "replaced by gray",
-                        object.span.clone(),
-                    );
-                    DVec3::splat(0.5)
-                }
-            };
+        let mut color = |name: &str, default: f64| match self.color_or_texture(
+            object,
+            name,
+            ColorRole::Reflectance,
+            default,
+        ) {
+            ColorSource::Constant(color) => color,
+            ColorSource::Texture(_) => {
+                self.notes.substitute_changing_lighting(
+                    "a texture in a checkerboard",
+                    "replaced by gray",
+                    object.span.clone(),
+                );
+                DVec3::splat(0.5)
+            }
+        };
         [color("color0", 0.4), color("color1", 0.2)]
     }
 
@@ -334,7 +350,7 @@ impl<'a> SceneReader<'a> {
         &mut self,
         object: &'a PluginInstance,
         usage: MitsubaTextureUse,
-        uv: UvConvention,
+        uv: UvFlips,
     ) -> Option<TableEntries> {
         let mut colors = self.checker_colors(object);
         match usage {
@@ -346,14 +362,14 @@ impl<'a> SceneReader<'a> {
                 return None;
             }
         }
-        Some(self.checker_keys(object, colors, uv))
+        Some(self.checker_keys_with_colors(object, colors, uv))
     }
 
-    pub(super) fn checker_keys(
+    pub(super) fn checker_keys_with_colors(
         &mut self,
         object: &'a PluginInstance,
         colors: [DVec3; 2],
-        uv: UvConvention,
+        uv: UvFlips,
     ) -> TableEntries {
         let colors = colors.map(shorten_color).to_vec();
         let mut keys: TableEntries = vec![("type", "checker".into()), ("colors", BuiltValue::Array(colors))];
@@ -363,7 +379,7 @@ impl<'a> SceneReader<'a> {
 
     /// Adds a texture with these keys unless an equal one exists, and returns its name. The spans locate the
     /// texture and its file name in the text.
-    pub(super) fn add_texture_table(
+    pub(super) fn find_or_add_texture_table(
         &mut self,
         mut keys: TableEntries,
         wanted: &str,
@@ -388,12 +404,12 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Adds a checkerboard of α as a texture of √α.
-    fn checkerboard_of_roots(&mut self, index: ObjectIndex, uv: UvConvention) -> Option<String> {
+    fn add_square_root_checkerboard(&mut self, index: NodeIndex, uv: UvFlips) -> Option<String> {
         let object = self.object_by_index(index);
         let [first, second] = self.checker_colors(object);
         let root = |color: DVec3| DVec3::splat(libm::sqrt(luminance(color).clamp(1e-4, 1.0)));
-        let keys = self.checker_keys(object, [root(second), root(first)], uv);
-        Some(self.add_texture_table(keys, "roughness", [object.span.clone(), object.span.clone()]))
+        let keys = self.checker_keys_with_colors(object, [root(second), root(first)], uv);
+        Some(self.find_or_add_texture_table(keys, "roughness", [object.span.clone(), object.span.clone()]))
     }
 }
 
@@ -411,16 +427,16 @@ pub(super) fn extension(name: &str) -> String {
 mod tests {
     use super::*;
 
-    fn map(uv: UvConvention, to_uv: DMat4, is_image: bool) -> impl Fn(f64, f64) -> [f64; 2] {
-        let UvMap { rows, offset } = UvMap::new(&to_uv, uv, is_image);
+    fn map(uv: UvFlips, to_uv: DMat4, is_image: bool) -> impl Fn(f64, f64) -> [f64; 2] {
+        let UvAffineMap { rows, offset } = UvAffineMap::new(&to_uv, uv, is_image);
         move |u, v| std::array::from_fn(|index| rows[index][0] * u + rows[index][1] * v + offset[index])
     }
 
     #[test]
     fn uv_maps_follow_mitsubas_order() {
-        let obj = UvConvention { flips_v: true, flips_u: false };
+        let obj = UvFlips { flips_v: true, flips_u: false };
         assert_eq!(map(obj, DMat4::IDENTITY, true)(0.25, 0.75), [0.25, 0.75]);
-        assert_eq!(map(UvConvention::default(), DMat4::IDENTITY, true)(0.25, 0.75), [0.25, 0.25]);
+        assert_eq!(map(UvFlips::default(), DMat4::IDENTITY, true)(0.25, 0.75), [0.25, 0.25]);
         // v scale s and offset t give the offset 1 − s − t.
         let to_uv = DMat4::from_translation(DVec3::new(0.0, 0.25, 0.0))
             * DMat4::from_scale(DVec3::new(1.0, 4.0, 1.0));
@@ -431,10 +447,10 @@ mod tests {
     #[test]
     fn rotations_are_decomposed() {
         let to_uv = DMat4::from_rotation_z(0.5) * DMat4::from_scale(DVec3::new(2.0, 3.0, 1.0));
-        let keys = UvMap::new(&to_uv, UvConvention::default(), false).keys().expect("a map");
+        let keys = UvAffineMap::new(&to_uv, UvFlips::default(), false).keys().expect("a map");
         let names: Vec<_> = keys.iter().map(|(key, _)| *key).collect();
         assert_eq!(names, ["repeat", "rotate"]);
         let shear = DMat4::from_scale(DVec3::new(2.0, 3.0, 1.0)) * DMat4::from_rotation_z(0.5);
-        assert!(UvMap::new(&shear, UvConvention::default(), false).keys().is_none());
+        assert!(UvAffineMap::new(&shear, UvFlips::default(), false).keys().is_none());
     }
 }

@@ -1,12 +1,12 @@
 //! Reports nested objects and settings that no function has read.
 
-use super::graph::{Child, ObjectIndex, ObjectKind, PluginInstance};
+use super::graph::{Child, NodeIndex, ObjectKind, PluginInstance};
 use super::reader::SceneReader;
-use super::xml::shorten;
+use super::xml::truncate_for_message;
 
 impl<'a> SceneReader<'a> {
     /// Notes nested objects of an object that no function has read.
-    pub(super) fn report_unused_children(&mut self, index: ObjectIndex) {
+    pub(super) fn report_unused_children(&mut self, index: NodeIndex) {
         let object = self.object_by_index(index);
         if self.reported_children.insert(index) {
             object.children.iter().filter(|child| !child.is_used.get()).for_each(|child| {
@@ -17,16 +17,16 @@ impl<'a> SceneReader<'a> {
 
     fn report_unused_child(&mut self, object: &'a PluginInstance, child: &'a Child) {
         let inner = self.object_by_index(child.target);
-        let parent = shorten(&object.plugin);
+        let parent = truncate_for_message(&object.plugin);
         let subject = match &child.name {
-            Some(name) => format!("`{}` of `{parent}`", shorten(name)),
-            None => format!("`{}` in `{parent}`", shorten(&inner.plugin)),
+            Some(name) => format!("`{}` of `{parent}`", truncate_for_message(name)),
+            None => format!("`{}` in `{parent}`", truncate_for_message(&inner.plugin)),
         };
         self.notes.note(&subject, "ignored", child.span.clone());
     }
 
     /// Notes a nested object of the scene that is not converted and cannot be referred to.
-    pub(super) fn report_unreachable_child(&mut self, scene: &'a PluginInstance, child: &'a Child) {
+    pub(super) fn report_child_if_unreachable(&mut self, scene: &'a PluginInstance, child: &'a Child) {
         let inner = self.object_by_index(child.target);
         // Without a name, only the scene itself could use the object.
         let is_definition =
@@ -37,11 +37,11 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Notes unused properties and nested objects of the sensor, the integrator, and the objects in them.
-    pub(super) fn report_unused_settings(&mut self, scene: &'a PluginInstance, sensor: ObjectIndex) {
+    pub(super) fn report_unused_settings(&mut self, scene: &'a PluginInstance, sensor: NodeIndex) {
         let integrators = scene.children.iter().filter(|child| {
             child.is_used.get() && self.object_by_index(child.target).kind == ObjectKind::Integrator
         });
-        let mut pending: Vec<ObjectIndex> = integrators.map(|child| child.target).collect();
+        let mut pending: Vec<NodeIndex> = integrators.map(|child| child.target).collect();
         pending.push(sensor);
         while let Some(index) = pending.pop() {
             let object = self.object_by_index(index);

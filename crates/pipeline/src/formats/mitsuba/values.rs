@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::property::{PropertyValue, SpectrumValue, TransformValue};
-use super::xml::{Attribute, Element, shorten};
+use super::xml::{Attribute, Element, truncate_for_message};
 use crate::formats::foreign::spectra::SampledSpectrum;
 use crate::formats::foreign::transform::{look_at_left, rotation_about_raw_axis};
 use crate::math::color::srgb_to_linear;
@@ -34,19 +34,26 @@ pub(super) fn parse_float(text: &str, span: &Range<usize>) -> Result<f64, ValueE
         Some(_) => {
             Err(ValueError::new(span, format!("the number must be finite and within ±{MAX_NUMBER:e}")))
         }
-        None => Err(ValueError::new(span, format!("expected a number, found `{}`", shorten(text)))),
+        None => {
+            Err(ValueError::new(span, format!("expected a number, found `{}`", truncate_for_message(text))))
+        }
     }
 }
 
 pub(super) fn parse_integer(text: &str, span: &Range<usize>) -> Result<i64, ValueError> {
-    text.parse().map_err(|_| ValueError::new(span, format!("expected an integer, found `{}`", shorten(text))))
+    text.parse().map_err(|_| {
+        ValueError::new(span, format!("expected an integer, found `{}`", truncate_for_message(text)))
+    })
 }
 
 pub(super) fn parse_boolean(text: &str, span: &Range<usize>) -> Result<bool, ValueError> {
     match text.to_ascii_lowercase().as_str() {
         "true" => Ok(true),
         "false" => Ok(false),
-        _ => Err(ValueError::new(span, format!("expected true or false, found `{}`", shorten(text)))),
+        _ => Err(ValueError::new(
+            span,
+            format!("expected true or false, found `{}`", truncate_for_message(text)),
+        )),
     }
 }
 
@@ -105,7 +112,7 @@ fn parse_hexadecimal(text: &str, span: &Range<usize>) -> Result<DVec3, ValueErro
 }
 
 /// Parses a number, an RGB color, or pairs of wavelength and value.
-pub(super) fn parse_spectrum(attribute: &Attribute) -> Result<PropertyValue, ValueError> {
+pub(super) fn parse_spectrum_or_rgb(attribute: &Attribute) -> Result<PropertyValue, ValueError> {
     let (text, span) = (attribute.value.trim(), &attribute.span);
     if !text.contains(':') {
         if text.starts_with('#') {
@@ -122,7 +129,10 @@ pub(super) fn parse_spectrum(attribute: &Attribute) -> Result<PropertyValue, Val
     }
     let pair = |word: &str| {
         let (wavelength, value) = word.split_once(':').ok_or_else(|| {
-            ValueError::new(span, format!("expected WAVELENGTH:VALUE, found `{}`", shorten(word)))
+            ValueError::new(
+                span,
+                format!("expected WAVELENGTH:VALUE, found `{}`", truncate_for_message(word)),
+            )
         })?;
         Ok([parse_float(wavelength, span)?, parse_float(value, span)?])
     };
@@ -140,9 +150,10 @@ pub(super) fn parse_point(element: &Element, default: Option<f64>) -> Result<DVe
     let component = |name: &str| match (element.attribute(name), default) {
         (Some(attribute), _) => parse_float(&attribute.value, &attribute.span),
         (None, Some(default)) => Ok(default),
-        (None, None) => {
-            Err(ValueError::new(&element.span, format!("<{}> needs `{name}`", shorten(&element.tag))))
-        }
+        (None, None) => Err(ValueError::new(
+            &element.span,
+            format!("<{}> needs `{name}`", truncate_for_message(&element.tag)),
+        )),
     };
     Ok(DVec3::new(component("x")?, component("y")?, component("z")?))
 }
@@ -177,7 +188,11 @@ pub(super) fn check_attributes(element: &Element, known: &[&str]) -> Result<(), 
         Some(near) => format!("did you mean `{near}`?"),
         None => format!("expected {}", known.join(", ")),
     };
-    let message = format!("<{}> has no attribute `{}`", shorten(&element.tag), shorten(&unknown.name));
+    let message = format!(
+        "<{}> has no attribute `{}`",
+        truncate_for_message(&element.tag),
+        truncate_for_message(&unknown.name)
+    );
     Err(ValueError { help: Some(help), ..ValueError::new(&unknown.span, message) })
 }
 
@@ -192,7 +207,8 @@ fn parse_transform_step(step: &Element) -> Result<(DMat4, Option<DVec3>), ValueE
         check_attributes(step, known)?;
     }
     let required = |name: &str| {
-        let missing = || ValueError::new(&step.span, format!("<{}> needs `{name}`", shorten(&step.tag)));
+        let missing =
+            || ValueError::new(&step.span, format!("<{}> needs `{name}`", truncate_for_message(&step.tag)));
         step.attribute(name).ok_or_else(missing)
     };
     let matrix = match step.tag.to_ascii_lowercase().as_str() {
@@ -211,7 +227,7 @@ fn parse_transform_step(step: &Element) -> Result<(DMat4, Option<DVec3>), ValueE
         "matrix" => parse_matrix(required("value")?)?,
         other => {
             let help = nearest_name(other, STEPS).map(|near| format!("did you mean <{near}>?"));
-            let message = format!("<{}> is not a step of a transform", shorten(other));
+            let message = format!("<{}> is not a step of a transform", truncate_for_message(other));
             return Err(ValueError { help, ..ValueError::new(&step.span, message) });
         }
     };
@@ -295,7 +311,7 @@ mod tests {
     fn spectra_are_numbers_colors_or_pairs() {
         let parse = |value: &str| {
             let attribute = Attribute { name: "value".to_owned(), value: value.to_owned(), span: 0..1 };
-            parse_spectrum(&attribute)
+            parse_spectrum_or_rgb(&attribute)
         };
         assert_eq!(parse("0.5"), Ok(PropertyValue::Spectrum(SpectrumValue::Uniform(0.5))));
         assert_eq!(parse("1, 2, 3"), Ok(PropertyValue::Rgb(DVec3::new(1.0, 2.0, 3.0))));

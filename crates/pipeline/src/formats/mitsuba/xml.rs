@@ -102,10 +102,10 @@ impl<'a> XmlLoader<'a> {
     }
 
     /// Loads the scene file and all files that it includes, and substitutes the parameters.
-    pub(super) fn load_scene(&mut self, path: &Path) -> Result<Option<Element>, AssetError> {
+    pub(super) fn load_scene_elements(&mut self, path: &Path) -> Result<Option<Element>, AssetError> {
         let Some(mut root) = self.load_file(path)? else { return Ok(None) };
         if root.tag != "scene" {
-            let message = format!("the root element is <{}>, not <scene>", shorten(&root.tag));
+            let message = format!("the root element is <{}>, not <scene>", truncate_for_message(&root.tag));
             let help = "this file is part of a scene; open the file that includes it".to_owned();
             self.report_error(root.span.clone(), message, Some(help));
             return Ok(None);
@@ -141,7 +141,7 @@ impl<'a> XmlLoader<'a> {
         }
         self.open.push(path.to_owned());
         let source = FileSource { text: &text, start, is_old, path };
-        let element = self.convert(&root, &source, 0);
+        let element = self.element_from_node(&root, &source, 0);
         self.open.pop();
         element
     }
@@ -169,11 +169,15 @@ impl<'a> XmlLoader<'a> {
             other => byte_offset_at_position(text, other.pos()),
         };
         let next = text[offset..].chars().next().map_or(0, char::len_utf8);
-        self.report_error(start + offset..start + offset + next, shorten(&message), Some(help.to_owned()));
+        self.report_error(
+            start + offset..start + offset + next,
+            truncate_for_message(&message),
+            Some(help.to_owned()),
+        );
     }
 
     /// Converts a node and its children, and replaces includes with the included elements.
-    fn convert(
+    fn element_from_node(
         &mut self,
         node: &Node<'_, '_>,
         source: &FileSource<'_>,
@@ -212,21 +216,21 @@ impl<'a> XmlLoader<'a> {
         for child in node.children().filter(Node::is_element) {
             match child.tag_name().name() {
                 "default" => {
-                    if let Some(default) = self.convert(&child, source, depth + 1)? {
+                    if let Some(default) = self.element_from_node(&child, source, depth + 1)? {
                         self.add_default(&default);
                     }
                 }
                 "path" => {
-                    if let Some(path) = self.convert(&child, source, depth + 1)? {
+                    if let Some(path) = self.element_from_node(&child, source, depth + 1)? {
                         self.add_folder(&path, source.path);
                     }
                 }
                 "include" => {
-                    if let Some(include) = self.convert(&child, source, depth + 1)? {
+                    if let Some(include) = self.element_from_node(&child, source, depth + 1)? {
                         self.include(include, source.path, &mut element.children)?;
                     }
                 }
-                _ => element.children.extend(self.convert(&child, source, depth + 1)?),
+                _ => element.children.extend(self.element_from_node(&child, source, depth + 1)?),
             }
         }
         Ok(Some(element))
@@ -243,7 +247,7 @@ impl<'a> XmlLoader<'a> {
         let length = line.char_indices().nth(40).map_or(line.len(), |(at, _)| at);
         let span = source.start + start..source.start + start + length;
         let help = "remove it, or make it a comment: <!-- … -->".to_owned();
-        self.report_error(span, format!("unexpected text `{}`", shorten(line)), Some(help));
+        self.report_error(span, format!("unexpected text `{}`", truncate_for_message(line)), Some(help));
     }
 
     fn add_default(&mut self, default: &Element) {
@@ -255,7 +259,7 @@ impl<'a> XmlLoader<'a> {
             return;
         }
         let name = name.to_owned();
-        let value = substitute(&value.value, &self.parameters);
+        let value = substitute_parameters(&value.value, &self.parameters);
         if value.len() > MAX_SUBSTITUTED_BYTES || name.is_empty() {
             let message = if name.is_empty() { "the name is empty" } else { "the value is too long" };
             return self.report_error(default.span.clone(), message, None);
@@ -267,7 +271,7 @@ impl<'a> XmlLoader<'a> {
         let Some(value) = path.attribute("value") else {
             return self.report_error(path.span.clone(), "<path> needs `value`", None);
         };
-        let folder = substitute(&value.value, &self.parameters).replace('\\', "/");
+        let folder = substitute_parameters(&value.value, &self.parameters).replace('\\', "/");
         let span = value.span.clone();
         let near = file.parent().unwrap_or(Path::new("")).join(&folder);
         let others = self.folders.iter().rev().map(|known| known.join(&folder));
@@ -276,7 +280,7 @@ impl<'a> XmlLoader<'a> {
             Some(folder) => self.folders.push(folder.clone()),
             None => {
                 candidates.into_iter().for_each(|folder| self.reader.watch_missing(folder));
-                self.report_error(span, format!("folder not found: {}", shorten(&folder)), None);
+                self.report_error(span, format!("folder not found: {}", truncate_for_message(&folder)), None);
             }
         }
     }
@@ -292,7 +296,7 @@ impl<'a> XmlLoader<'a> {
             return Ok(());
         };
         // Files written on Windows have backslashes.
-        name.value = substitute(&name.value, &self.parameters).replace('\\', "/");
+        name.value = substitute_parameters(&name.value, &self.parameters).replace('\\', "/");
         let (span, name) = (name.span.clone(), name.value.clone());
         let near = file.parent().unwrap_or(Path::new("")).join(&name);
         let others = self.folders.iter().rev().map(|folder| folder.join(&name));
@@ -307,10 +311,14 @@ impl<'a> XmlLoader<'a> {
         }
         let Some(found) = found else {
             let help = "files are searched next to this file, then in the folders of <path>".to_owned();
-            self.report_error(span, format!("included file not found: {}", shorten(&name)), Some(help));
+            self.report_error(
+                span,
+                format!("included file not found: {}", truncate_for_message(&name)),
+                Some(help),
+            );
             return Ok(());
         };
-        let is_same = |open: &PathBuf| same_file(open, &found);
+        let is_same = |open: &PathBuf| is_same_file(open, &found);
         if self.open.iter().any(is_same) {
             self.report_error(span, "the file includes itself", Some("remove this include".to_owned()));
             return Ok(());
@@ -344,7 +352,7 @@ impl<'a> XmlLoader<'a> {
             if !attribute.value.contains('$') {
                 continue;
             }
-            attribute.value = substitute(&attribute.value, &self.parameters);
+            attribute.value = substitute_parameters(&attribute.value, &self.parameters);
             self.substituted_bytes += attribute.value.len();
             let is_too_long = attribute.value.len() > MAX_SUBSTITUTED_BYTES;
             if is_too_long || self.substituted_bytes > MAX_ADDED_BYTES {
@@ -363,7 +371,7 @@ impl<'a> XmlLoader<'a> {
             if let Some(at) = attribute.value.find('$') {
                 let rest = &attribute.value[at + 1..];
                 let end = rest.find(|c: char| !c.is_alphanumeric() && c != '_').unwrap_or(rest.len());
-                let name = shorten(&rest[..end]);
+                let name = truncate_for_message(&rest[..end]);
                 let known = self.parameters.iter().map(|(name, _)| name.as_str());
                 let help = match nearest_name(&name, known) {
                     Some(near) => format!("did you mean `${near}`?"),
@@ -394,7 +402,7 @@ struct FileSource<'a> {
 }
 
 /// Replaces each `$name` with the value of the parameter. The longest matching name is used.
-fn substitute(text: &str, parameters: &[(String, String)]) -> String {
+fn substitute_parameters(text: &str, parameters: &[(String, String)]) -> String {
     if !text.contains('$') {
         return text.to_owned();
     }
@@ -455,7 +463,7 @@ fn byte_offset_at_position(text: &str, position: TextPos) -> usize {
 }
 
 /// Whether two paths refer to the same file.
-fn same_file(a: &Path, b: &Path) -> bool {
+fn is_same_file(a: &Path, b: &Path) -> bool {
     match (a.canonicalize(), b.canonicalize()) {
         (Ok(a), Ok(b)) => a == b,
         (Ok(_) | Err(_), Err(_)) | (Err(_), Ok(_)) => a == b,
@@ -463,7 +471,7 @@ fn same_file(a: &Path, b: &Path) -> bool {
 }
 
 /// Truncates text from the scene for messages, and removes control characters.
-pub(super) fn shorten(text: &str) -> String {
+pub(super) fn truncate_for_message(text: &str) -> String {
     const MAX_CHARS: usize = 120;
     let mut shown: String = text.chars().filter(|c| !c.is_control()).take(MAX_CHARS).collect();
     if text.chars().nth(MAX_CHARS).is_some() {
@@ -479,8 +487,8 @@ mod tests {
     #[test]
     fn longest_parameter_name_is_substituted() {
         let parameters = [("a", "1"), ("ab", "2"), ("c", "$a")].map(|(a, b)| (a.to_owned(), b.to_owned()));
-        assert_eq!(substitute("$ab $a $abc $b", &parameters), "2 1 2c $b");
-        assert_eq!(substitute("$c", &parameters), "$a");
+        assert_eq!(substitute_parameters("$ab $a $abc $b", &parameters), "2 1 2c $b");
+        assert_eq!(substitute_parameters("$c", &parameters), "$a");
     }
 
     #[test]

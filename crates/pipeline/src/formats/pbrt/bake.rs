@@ -59,12 +59,14 @@ impl PbrtConverter<'_> {
     }
 
     /// Whether an image is gray and opaque, so that its first channel is the number that pbrt uses.
-    pub(super) fn is_gray_image(&mut self, image: &ImageNode) -> bool {
+    pub(super) fn is_gray_opaque_image(&mut self, image: &ImageNode) -> bool {
         let path = self.asset_path(&image.file.text);
         let stamp = FileStamp::from_path(&path);
         self.companions.push(Companion { path: path.clone(), hash: None, stamp });
         memo::is_image_gray_memoized(&path, stamp, || {
-            let Ok(texels) = self.decode(image, ColorEncoding::CutOut(ColorTransferFunction::Srgb)) else {
+            let Ok(texels) =
+                self.load_and_watch_image(image, ColorEncoding::CutOut(ColorTransferFunction::Srgb))
+            else {
                 return true;
             };
             texels.are_all_gray() && !has_transparency(&texels)
@@ -73,7 +75,7 @@ impl PbrtConverter<'_> {
 
     /// Mean luminance of an image.
     pub(super) fn mean_luminance(&mut self, image: &ImageNode) -> PbrtResult<f64> {
-        let texels = self.decode(image, ColorEncoding::Srgb);
+        let texels = self.load_and_watch_image(image, ColorEncoding::Srgb);
         let texels = texels.map_err(|error| PbrtError::new(image.file.span.clone(), error.to_string()))?;
         Ok(f64::from(luminance(texels.mean())).max(1e-12))
     }
@@ -91,7 +93,7 @@ impl PbrtConverter<'_> {
         for leaf in &leaves {
             if let TextureNode::Image(image) = leaf {
                 let loaded = self.load_image(image, &mut images);
-                if self.attempt(loaded).is_none() {
+                if self.value_or_record_error(loaded).is_none() {
                     return (vec![("file", image.file.text.clone().into())], "image".to_owned());
                 }
             }
@@ -115,12 +117,12 @@ impl PbrtConverter<'_> {
     }
 
     fn load_image(&mut self, image: &ImageNode, images: &mut Images) -> PbrtResult<()> {
-        let key = image_key(image);
+        let key = decoded_image_key(image);
         if images.contains_key(&key) {
             return Ok(());
         }
         let curve = if image.is_linear { ColorTransferFunction::Linear } else { ColorTransferFunction::Srgb };
-        let texels = self.decode(image, ColorEncoding::CutOut(curve));
+        let texels = self.load_and_watch_image(image, ColorEncoding::CutOut(curve));
         let texels = texels.map_err(|error| PbrtError::new(image.file.span.clone(), error.to_string()))?;
         let is_alpha = has_transparency(&texels);
         let value = |index: usize| {
@@ -139,7 +141,11 @@ impl PbrtConverter<'_> {
         Ok(())
     }
 
-    fn decode(&mut self, image: &ImageNode, encoding: ColorEncoding) -> Result<Texels, AssetError> {
+    fn load_and_watch_image(
+        &mut self,
+        image: &ImageNode,
+        encoding: ColorEncoding,
+    ) -> Result<Texels, AssetError> {
         let path = self.asset_path(&image.file.text);
         let stamp = FileStamp::from_path(&path);
         let loaded = load_and_hash(&path, encoding, ImageLimits::default(), &ignore_progress, self.token);
@@ -160,7 +166,7 @@ fn has_transparency(texels: &Texels) -> bool {
     texels.has_alpha() && (0..texels.len()).any(|index| texels.premultiplied_texel(index).w < 1.0)
 }
 
-fn image_key(image: &ImageNode) -> DecodedImageKey {
+fn decoded_image_key(image: &ImageNode) -> DecodedImageKey {
     (image.file.text.clone(), image.is_linear, image.is_number)
 }
 
@@ -181,7 +187,7 @@ fn collect_uv_dependent_nodes<'a>(node: &'a TextureNode, leaves: &mut Vec<&'a Te
 fn leaf_mapping_and_resolution(leaf: &TextureNode, images: &Images) -> (UvMapping, f64, DVec2) {
     match leaf {
         TextureNode::Image(image) => {
-            let size = images.get(&image_key(image));
+            let size = images.get(&decoded_image_key(image));
             let size = size.map_or(DVec2::ONE, |size| DVec2::new(size.width as f64, size.height as f64));
             (image.mapping, 1.0, size)
         }
@@ -292,7 +298,7 @@ fn evaluate(node: &TextureNode, images: &Images, uv: DVec2) -> DVec3 {
 }
 
 fn image_color_at_uv(image: &ImageNode, images: &Images, uv: DVec2) -> DVec3 {
-    let Some(pixels) = images.get(&image_key(image)) else { return DVec3::ZERO };
+    let Some(pixels) = images.get(&decoded_image_key(image)) else { return DVec3::ZERO };
     let at = uv * image.mapping.scale + image.mapping.offset;
     let place = DVec2::new(at.x * pixels.width as f64, (1.0 - at.y) * pixels.height as f64);
     let place = match image.filter {

@@ -151,7 +151,7 @@ impl<'a> ColorReader<'a> {
             }
             Values::Texts(texts) => {
                 let name = found.single(texts)?;
-                if let Some(color) = named_color(&name.text, usage) {
+                if let Some(color) = named_spectrum_color(&name.text, usage) {
                     return Ok(color);
                 }
                 self.read_spectrum_file(name)?
@@ -217,7 +217,7 @@ fn unit_luminance_spectrum_color(spectrum: impl Fn(f64) -> f64) -> DVec3 {
 }
 
 /// Returns the color of one of pbrt's named spectra.
-fn named_color(name: &str, usage: SpectrumUse) -> Option<DVec3> {
+fn named_spectrum_color(name: &str, usage: SpectrumUse) -> Option<DVec3> {
     if let Some((_, [x, y])) = ILLUMINANTS.iter().find(|(known, _)| *known == name) {
         // D65 is the white point of Rec. 709.
         let is_white = name == "stdillum-D65" || usage != SpectrumUse::Emission;

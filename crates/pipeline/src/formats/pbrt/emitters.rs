@@ -6,7 +6,7 @@ use super::material_tables::{Emission, ShapeProperties};
 use super::parameters::Parameters;
 use super::scene::PbrtConverter;
 use super::shapes::round_shape_area;
-use super::state::{Entity, ShapeEntity};
+use super::state::{ShapeEntity, TypedStatement};
 use super::texture_nodes::{ImageFilter, ImageNode, ImageWrap, TextureNode, TextureValueKind, UvMapping};
 use crate::formats::foreign::meshes::MeshData;
 use crate::math::{DMat4, DVec3};
@@ -44,7 +44,8 @@ impl PbrtConverter<'_> {
         };
         let (parameters, space) = (&entity.parameters, entity.color_space);
         let notes = &mut self.notes;
-        let alpha = self.resolver.parameter(parameters, "alpha", TextureValueKind::Number, space, notes)?;
+        let alpha =
+            self.resolver.texture_or_constant(parameters, "alpha", TextureValueKind::Number, space, notes)?;
         let alpha = alpha.filter(|alpha| alpha.as_constant().is_none_or(|alpha| alpha.x < 1.0));
         let is_hidden = alpha.as_ref().and_then(TextureNode::as_constant).is_some_and(|alpha| alpha.x <= 0.0);
         let tint = self.read_inside_transmittance(shape)?;
@@ -62,8 +63,8 @@ impl PbrtConverter<'_> {
     /// Returns the emission of a shape, or `None` if it is black.
     fn read_shape_emission(
         &mut self,
-        light: &Entity,
-        shape: &Entity,
+        light: &TypedStatement,
+        shape: &TypedStatement,
         data: Option<&MeshData>,
         matrix: &DMat4,
     ) -> PbrtResult<Option<Emission>> {
@@ -80,7 +81,7 @@ impl PbrtConverter<'_> {
         Ok(Some(emission).filter(|emission| emission.color != DVec3::ZERO))
     }
 
-    fn read_area_light_parameters(&mut self, light: &Entity) -> PbrtResult<AreaLight> {
+    fn read_area_light_parameters(&mut self, light: &TypedStatement) -> PbrtResult<AreaLight> {
         let (parameters, space) = (&light.parameters, light.color_space);
         let color = self.resolver.colors.color(parameters, "L", space, SpectrumUse::Emission)?;
         let file = parameters.string("filename")?;
@@ -121,7 +122,12 @@ impl PbrtConverter<'_> {
 
     /// Returns the area that emits `power`. In pbrt, each triangle of a mesh is a light with this power, so
     /// the area is the mean area of the triangles.
-    fn area_for_power(&mut self, shape: &Entity, data: Option<&MeshData>, matrix: &DMat4) -> PbrtResult<f64> {
+    fn area_for_power(
+        &mut self,
+        shape: &TypedStatement,
+        data: Option<&MeshData>,
+        matrix: &DMat4,
+    ) -> PbrtResult<f64> {
         let (parameters, span) = (&shape.parameters, shape.span());
         let loaded;
         let data = match (&*shape.kind.text, data) {
@@ -161,7 +167,7 @@ impl PbrtConverter<'_> {
                 let error = PbrtError::new(span, format!("there is no medium \"{shown}\""));
                 return Err(error.with_suggestion(near));
             };
-            let absorption = self.pure_absorption(medium)?;
+            let absorption = self.pure_absorption_coefficient(medium)?;
             match absorption.filter(|_| is_inside && inside != outside) {
                 Some(absorption) => {
                     tint = Some(DVec3::from(absorption.to_array().map(|part| libm::exp(-part))));
@@ -181,7 +187,7 @@ impl PbrtConverter<'_> {
     }
 
     /// Returns the absorption coefficient of a medium, or `None` if the medium scatters or emits light.
-    fn pure_absorption(&self, medium: &Entity) -> PbrtResult<Option<DVec3>> {
+    fn pure_absorption_coefficient(&self, medium: &TypedStatement) -> PbrtResult<Option<DVec3>> {
         let parameters = &medium.parameters;
         let kind = parameters.string("type")?.map_or("", |kind| &kind.text);
         let color = |name, default: f64| {

@@ -48,7 +48,7 @@ pub(super) struct InfiniteImage {
 }
 
 /// A decoded image of an infinite light.
-struct Map {
+struct InfiniteLightMap {
     pixels: Pixels,
     scale: f64,
     /// World-to-light transform.
@@ -59,7 +59,7 @@ struct Map {
 
 impl PbrtConverter<'_> {
     /// Writes the `[environment]` table.
-    pub(super) fn convert_environment(&mut self, lights: &InfiniteLights) -> PbrtResult<()> {
+    pub(super) fn convert_infinite_lights(&mut self, lights: &InfiniteLights) -> PbrtResult<()> {
         if lights.images.is_empty() {
             if lights.color != DVec3::ZERO {
                 self.document.start_table("environment");
@@ -78,7 +78,7 @@ impl PbrtConverter<'_> {
         }
         let rows = maps.iter().map(|map| map.pixels.height).max().unwrap_or(ROWS[0]);
         let rows = rows.clamp(ROWS[0], ROWS[1]);
-        let bytes = memo::environment(key, || {
+        let bytes = memo::memoized_environment_map(key, || {
             combine_as_equirectangular(&maps, lights.color, rows).encode_pfm(false)
         });
         let span = lights.images[0].file.span.clone();
@@ -89,7 +89,7 @@ impl PbrtConverter<'_> {
         Ok(())
     }
 
-    fn load_map(&mut self, image: &InfiniteImage) -> PbrtResult<Map> {
+    fn load_map(&mut self, image: &InfiniteImage) -> PbrtResult<InfiniteLightMap> {
         let path = self.asset_path(&image.file.text);
         let (limits, encoding) = (ImageLimits::default(), ColorEncoding::Color);
         let stamp = FileStamp::from_path(&path);
@@ -108,7 +108,7 @@ impl PbrtConverter<'_> {
             Some(goal) => image.scale * goal / upper_illuminance(&pixels).max(1e-12),
             None => image.scale,
         };
-        Ok(Map { pixels, scale, to_light: image.matrix.inverse(), hash })
+        Ok(InfiniteLightMap { pixels, scale, to_light: image.matrix.inverse(), hash })
     }
 }
 
@@ -124,7 +124,7 @@ fn upper_illuminance(pixels: &Pixels) -> f64 {
     sum * TAU / pixels.values.len() as f64
 }
 
-impl Map {
+impl InfiniteLightMap {
     /// Radiance from a direction in world coordinates.
     fn radiance(&self, direction: DVec3) -> DVec3 {
         let local = self.to_light.transform_vector3(direction).normalize_or_zero();
@@ -151,7 +151,13 @@ struct TexelSampleStats {
 }
 
 /// Takes `count`² samples in a texel of the environment map.
-fn supersample_texel(maps: &[Map], rows: usize, column: usize, row: usize, count: usize) -> TexelSampleStats {
+fn supersample_texel(
+    maps: &[InfiniteLightMap],
+    rows: usize,
+    column: usize,
+    row: usize,
+    count: usize,
+) -> TexelSampleStats {
     let (mut sum, mut least, mut most) = (DVec3::ZERO, f64::INFINITY, 0.0_f64);
     for index in 0..count * count {
         let offset = |index: usize| (index as f64 + 0.5) / count as f64;
@@ -168,7 +174,7 @@ fn supersample_texel(maps: &[Map], rows: usize, column: usize, row: usize, count
 
 /// Resamples the sum of all maps and a constant as an equirectangular map. Takes more samples where
 /// neighboring texels differ strongly.
-fn combine_as_equirectangular(maps: &[Map], color: DVec3, rows: usize) -> Pixels {
+fn combine_as_equirectangular(maps: &[InfiniteLightMap], color: DVec3, rows: usize) -> Pixels {
     let columns = 2 * rows;
     let coarse: Vec<TexelSampleStats> = (0..rows * columns)
         .into_par_iter()
@@ -269,7 +275,7 @@ mod tests {
         let mut values = vec![Vec3::splat(0.01); size * size];
         values[20 * size + 37] = Vec3::splat(1000.0);
         let exact = 4.0 * PI * (1000.0 + 0.01 * (size * size - 1) as f64) / (size * size) as f64;
-        let map = Map {
+        let map = InfiniteLightMap {
             pixels: Pixels { width: size, height: size, values },
             scale: 1.0,
             to_light: DMat4::IDENTITY,
@@ -301,7 +307,7 @@ mod tests {
             DVec3::Y.extend(0.0),
             crate::math::DVec4::W,
         );
-        let map = Map { pixels, scale: 2.0, to_light: matrix.inverse(), hash: [0; 32] };
+        let map = InfiniteLightMap { pixels, scale: 2.0, to_light: matrix.inverse(), hash: [0; 32] };
         let resampled = combine_as_equirectangular(&[map], DVec3::new(0.0, 0.5, 0.0), 64);
         assert_eq!(resampled.get(17, 10), DVec3::new(2.0, 0.5, 0.0), "upper half");
         assert_eq!(resampled.get(90, 50), DVec3::new(0.0, 0.5, 2.0), "lower half");

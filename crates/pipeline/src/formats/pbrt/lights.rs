@@ -20,10 +20,10 @@ impl PbrtConverter<'_> {
         let mut infinite = InfiniteLights::default();
         for light in &self.statements.lights {
             let written = self.convert_light(light, &mut infinite);
-            self.attempt(written);
+            self.value_or_record_error(written);
         }
-        let written = self.convert_environment(&infinite);
-        self.attempt(written);
+        let written = self.convert_infinite_lights(&infinite);
+        self.value_or_record_error(written);
     }
 
     fn convert_light(&mut self, light: &PlacedEntity, infinite: &mut InfiniteLights) -> PbrtResult<()> {
@@ -35,15 +35,15 @@ impl PbrtConverter<'_> {
         }
         self.document.set_span_for_next_values(span.clone());
         match kind {
-            "point" => self.convert_point(light, &matrix)?,
-            "spot" => self.convert_spot(light, &matrix)?,
-            "distant" => self.convert_distant(light, &matrix)?,
-            "infinite" => self.read_infinite(light, &matrix, infinite)?,
+            "point" => self.convert_point_light(light, &matrix)?,
+            "spot" => self.convert_spot_light(light, &matrix)?,
+            "distant" => self.convert_distant_light(light, &matrix)?,
+            "infinite" => self.read_infinite_light(light, &matrix, infinite)?,
             "goniometric" => {
                 let text = "a point light with the same intensity in every direction is used";
                 self.notes.substitute_changing_lighting("light `goniometric`", text, span);
                 entity.parameters.ignore(&["filename"]);
-                self.convert_point(light, &matrix)?;
+                self.convert_point_light(light, &matrix)?;
             }
             "projection" => {
                 self.notes.substitute_changing_lighting("light `projection`", "skipped", span);
@@ -73,7 +73,7 @@ impl PbrtConverter<'_> {
         Ok(color.unwrap_or(DVec3::ONE) * scale)
     }
 
-    fn convert_point(&mut self, light: &PlacedEntity, matrix: &DMat4) -> PbrtResult<()> {
+    fn convert_point_light(&mut self, light: &PlacedEntity, matrix: &DMat4) -> PbrtResult<()> {
         let from = light.entity.parameters.triple("from", ParameterType::Point3, DVec3::ZERO)?;
         let intensity = self.scaled_color(light, ["I", "power"], 4.0 * PI)?;
         self.document.start_list_table("light");
@@ -83,7 +83,7 @@ impl PbrtConverter<'_> {
         Ok(())
     }
 
-    fn convert_spot(&mut self, light: &PlacedEntity, matrix: &DMat4) -> PbrtResult<()> {
+    fn convert_spot_light(&mut self, light: &PlacedEntity, matrix: &DMat4) -> PbrtResult<()> {
         let parameters = &light.entity.parameters;
         let from = parameters.triple("from", ParameterType::Point3, DVec3::ZERO)?;
         let to = parameters.triple("to", ParameterType::Point3, DVec3::Z)?;
@@ -115,7 +115,7 @@ impl PbrtConverter<'_> {
         Ok(())
     }
 
-    fn convert_distant(&mut self, light: &PlacedEntity, matrix: &DMat4) -> PbrtResult<()> {
+    fn convert_distant_light(&mut self, light: &PlacedEntity, matrix: &DMat4) -> PbrtResult<()> {
         let parameters = &light.entity.parameters;
         let from = parameters.triple("from", ParameterType::Point3, DVec3::ZERO)?;
         let to = parameters.triple("to", ParameterType::Point3, DVec3::Z)?;
@@ -131,7 +131,7 @@ impl PbrtConverter<'_> {
         Ok(())
     }
 
-    fn read_infinite(
+    fn read_infinite_light(
         &mut self,
         light: &PlacedEntity,
         matrix: &DMat4,

@@ -1,9 +1,9 @@
 //! Writes the `[materials]` tables.
 
 use super::lexer::{PbrtError, PbrtResult};
-use super::materials::{BlendPart, ConvertedMaterial};
+use super::materials::{BlendPartReference, ConvertedMaterial};
 use super::scene::{LoweredMaterial, PbrtConverter};
-use super::state::{Entity, MaterialReference};
+use super::state::{MaterialReference, TypedStatement};
 use super::texture_nodes::TextureNode;
 use super::textures::{PbrtTextureUse, texture_reference};
 use crate::formats::foreign::import::TableEntries;
@@ -36,7 +36,7 @@ pub(super) struct ShapeProperties {
 
 impl PbrtConverter<'_> {
     /// Returns the material of a shape, adding its table if it is new.
-    pub(super) fn material(
+    pub(super) fn find_or_add_material(
         &mut self,
         reference: &MaterialReference,
         span: &Range<usize>,
@@ -47,7 +47,7 @@ impl PbrtConverter<'_> {
             return known.clone();
         }
         let lowered = self.lower_material(reference, span, properties, 0);
-        let lowered = self.attempt(lowered).unwrap_or(LoweredMaterial::Invalid);
+        let lowered = self.value_or_record_error(lowered).unwrap_or(LoweredMaterial::Invalid);
         self.materials.insert(identity, lowered.clone());
         lowered
     }
@@ -57,7 +57,7 @@ impl PbrtConverter<'_> {
         &self,
         reference: &MaterialReference,
         span: &Range<usize>,
-    ) -> PbrtResult<(&Entity, String)> {
+    ) -> PbrtResult<(&TypedStatement, String)> {
         let statements = self.statements;
         match reference {
             MaterialReference::Index(index) => {
@@ -94,7 +94,7 @@ impl PbrtConverter<'_> {
         let model = self.read_material(&entity, is_named)?;
         self.document.set_span_for_next_values(entity.span());
         match model {
-            ConvertedMaterial::Invisible => Ok(self.lower_invisible(&name, properties)),
+            ConvertedMaterial::Invisible => Ok(self.lower_interface(&name, properties)),
             ConvertedMaterial::Blend { parts, amount } => {
                 self.lower_blend(&name, &parts, &amount, properties, &entity, depth)
             }
@@ -119,7 +119,7 @@ impl PbrtConverter<'_> {
     }
 
     /// Lowers an `interface`, which has no surface unless it emits light.
-    fn lower_invisible(&mut self, name: &str, properties: &ShapeProperties) -> LoweredMaterial {
+    fn lower_interface(&mut self, name: &str, properties: &ShapeProperties) -> LoweredMaterial {
         if properties.emission.is_none() {
             return LoweredMaterial::Invisible;
         }
@@ -134,14 +134,14 @@ impl PbrtConverter<'_> {
     fn lower_blend(
         &mut self,
         name: &str,
-        parts: &[BlendPart; 2],
+        parts: &[BlendPartReference; 2],
         amount: &TextureNode,
         properties: &ShapeProperties,
-        entity: &Entity,
+        entity: &TypedStatement,
         depth: usize,
     ) -> PbrtResult<LoweredMaterial> {
         let mut names = Vec::new();
-        for BlendPart { name, span } in parts {
+        for BlendPartReference { name, span } in parts {
             let reference = MaterialReference::Named(name.as_str().into());
             let lowered = self.lower_material(&reference, span, properties, depth + 1)?;
             match lowered {

@@ -4,7 +4,7 @@ use super::colors::SpectrumUse;
 use super::lexer::{PbrtError, PbrtResult};
 use super::parameters::{Parameters, Text};
 use super::scene::PbrtConverter;
-use super::state::{ColorSpace, Entity};
+use super::state::{ColorSpace, TypedStatement};
 use super::texture_nodes::{ImageFilter, ImageNode, ImageWrap, TextureNode, TextureValueKind, UvMapping};
 use super::textures::PbrtTextureUse;
 use crate::formats::foreign::import::TableEntries;
@@ -17,7 +17,7 @@ use crate::scene::sanitize::escape_and_truncate;
 use std::ops::Range;
 
 /// Reference to one of the materials of a `mix`.
-pub(super) struct BlendPart {
+pub(super) struct BlendPartReference {
     pub(super) name: String,
     pub(super) span: Range<usize>,
 }
@@ -32,7 +32,7 @@ pub(super) enum ConvertedMaterial {
         is_glass: bool,
     },
     Blend {
-        parts: [BlendPart; 2],
+        parts: [BlendPartReference; 2],
         amount: TextureNode,
     },
     Invisible,
@@ -82,7 +82,11 @@ struct MaterialReader<'w, 'a> {
 
 impl PbrtConverter<'_> {
     /// Reads a material. Named materials have their type in a parameter.
-    pub(super) fn read_material(&mut self, entity: &Entity, is_named: bool) -> PbrtResult<ConvertedMaterial> {
+    pub(super) fn read_material(
+        &mut self,
+        entity: &TypedStatement,
+        is_named: bool,
+    ) -> PbrtResult<ConvertedMaterial> {
         let parameters = &entity.parameters;
         let kind = match is_named {
             true => parameters.string("type")?.unwrap_or(&entity.kind).clone(),
@@ -105,7 +109,7 @@ impl PbrtConverter<'_> {
 }
 
 impl MaterialReader<'_, '_> {
-    fn read(mut self, kind: &Text, entity: &Entity) -> PbrtResult<ConvertedMaterial> {
+    fn read(mut self, kind: &Text, entity: &TypedStatement) -> PbrtResult<ConvertedMaterial> {
         let mut is_glass = false;
         match &*kind.text {
             "" | "none" | "interface" => return Ok(ConvertedMaterial::Invisible),
@@ -136,7 +140,7 @@ impl MaterialReader<'_, '_> {
                 self.writer.notes.substitute_changing_lighting("material `measured`", text, entity.span());
             }
             "hair" => self.read_hair(entity)?,
-            other => return Err(unknown_material(other, kind)),
+            other => return Err(unknown_material_type(other, kind)),
         }
         self.read_bump()?;
         self.read_normal_map()?;
@@ -150,7 +154,7 @@ impl MaterialReader<'_, '_> {
         value: TextureValueKind,
     ) -> PbrtResult<Option<TextureNode>> {
         let PbrtConverter { resolver, notes, .. } = &mut *self.writer;
-        let node = resolver.parameter(self.parameters, name, value, self.space, notes)?;
+        let node = resolver.texture_or_constant(self.parameters, name, value, self.space, notes)?;
         self.needs_uv |= node.as_ref().is_some_and(|node| node.as_constant().is_none());
         Ok(node)
     }
@@ -238,7 +242,7 @@ impl MaterialReader<'_, '_> {
         Ok(())
     }
 
-    fn read_coated_diffuse(&mut self, entity: &Entity) -> PbrtResult<()> {
+    fn read_coated_diffuse(&mut self, entity: &TypedStatement) -> PbrtResult<()> {
         self.keys.push(("type", "plastic".into()));
         self.color("diffuse", "reflectance", 0.5)?;
         let ior = self.read_ior("eta", 1.5)?;
@@ -251,11 +255,11 @@ impl MaterialReader<'_, '_> {
                 "glimt's base receives all light that the coat does not reflect, and is 2 to 5 % brighter";
             self.writer.notes.note("rough `coateddiffuse`", text, entity.span());
         }
-        self.read_layer_medium()
+        self.ignore_layer_medium()
     }
 
     /// Reads the medium between the layers of a coated material.
-    fn read_layer_medium(&mut self) -> PbrtResult<()> {
+    fn ignore_layer_medium(&mut self) -> PbrtResult<()> {
         let albedo = self.read_texture_node("albedo", TextureValueKind::REFLECTANCE)?;
         if albedo.is_some_and(|albedo| albedo.as_constant() != Some(DVec3::ZERO)) {
             let text = "the layer is clear";
@@ -350,7 +354,7 @@ impl MaterialReader<'_, '_> {
             "coat_roughness",
             ["interface.roughness", "interface.uroughness", "interface.vroughness"],
         )?;
-        self.read_layer_medium()
+        self.ignore_layer_medium()
     }
 
     fn read_diffuse_transmission(&mut self) -> PbrtResult<()> {
@@ -366,7 +370,7 @@ impl MaterialReader<'_, '_> {
     }
 
     /// Replaces a subsurface material with a diffuse base of the same albedo under a dielectric coat.
-    fn read_subsurface(&mut self, entity: &Entity) -> PbrtResult<()> {
+    fn read_subsurface(&mut self, entity: &TypedStatement) -> PbrtResult<()> {
         self.keys.push(("type", "plastic".into()));
         let unbounded = TextureValueKind::Color(SpectrumUse::Unbounded);
         let constant = |node: Option<TextureNode>, default: [f64; 3]| {
@@ -389,7 +393,7 @@ impl MaterialReader<'_, '_> {
         Ok(())
     }
 
-    fn read_hair(&mut self, entity: &Entity) -> PbrtResult<()> {
+    fn read_hair(&mut self, entity: &TypedStatement) -> PbrtResult<()> {
         let color = match self.read_texture_node("reflectance", TextureValueKind::REFLECTANCE)? {
             Some(color) => Some(color),
             None => self.read_texture_node("color", TextureValueKind::REFLECTANCE)?,
@@ -410,7 +414,7 @@ impl MaterialReader<'_, '_> {
             let span = self.parameters.span_of("materials");
             return Err(PbrtError::new(span, "a mix needs two names in `materials`"));
         };
-        let part = |text: &Text| BlendPart { name: text.text.clone(), span: text.span.clone() };
+        let part = |text: &Text| BlendPartReference { name: text.text.clone(), span: text.span.clone() };
         let parts = [part(first), part(second)];
         let amount = self.read_texture_node("amount", TextureValueKind::Number)?;
         let amount = amount.unwrap_or(TextureNode::Constant(DVec3::splat(0.5)));
@@ -422,7 +426,7 @@ impl MaterialReader<'_, '_> {
         let Some(node) = self.read_texture_node("displacement", TextureValueKind::Number)? else {
             return Ok(());
         };
-        let node = self.writer.without_missing_images(&node);
+        let node = self.writer.with_missing_images_gray(&node);
         if node.as_constant().is_some() {
             return Ok(());
         }
@@ -475,7 +479,7 @@ fn diffusion_albedo(absorption: DVec3, scattering: DVec3, asymmetry: f64) -> DVe
     )
 }
 
-fn unknown_material(kind: &str, at: &Text) -> Box<PbrtError> {
+fn unknown_material_type(kind: &str, at: &Text) -> Box<PbrtError> {
     let shown = escape_and_truncate(kind, 40);
     if OLD_MATERIALS.contains(&kind) || kind == "kdsubsurface" || kind == "disney" {
         let error = PbrtError::new(at.span.clone(), format!("\"{shown}\" is a pbrt-v3 material"));

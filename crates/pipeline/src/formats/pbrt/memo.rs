@@ -35,7 +35,7 @@ pub(super) fn is_image_gray_memoized(
 }
 
 /// Returns the environment map for a key. Calls `make` unless the last map had the same key.
-pub(super) fn environment(key: String, make: impl FnOnce() -> Vec<u8>) -> Vec<u8> {
+pub(super) fn memoized_environment_map(key: String, make: impl FnOnce() -> Vec<u8>) -> Vec<u8> {
     let lock = || ENVIRONMENT.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some((_, bytes)) = lock().as_ref().filter(|(known, _)| *known == key) {
         return bytes.clone();
@@ -59,7 +59,7 @@ mod tests {
         assert!(is_image_gray_memoized(&path, stamp, || false), "cached");
         std::fs::write(&path, "ab").expect("written");
         assert!(!is_image_gray_memoized(&path, FileStamp::from_path(&path), || false));
-        assert_eq!(environment("first of test".to_owned(), || vec![1]), [1]);
-        assert_eq!(environment("second of test".to_owned(), || vec![2]), [2]);
+        assert_eq!(memoized_environment_map("first of test".to_owned(), || vec![1]), [1]);
+        assert_eq!(memoized_environment_map("second of test".to_owned(), || vec![2]), [2]);
     }
 }

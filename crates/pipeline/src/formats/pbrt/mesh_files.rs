@@ -58,7 +58,7 @@ impl PbrtConverter<'_> {
             hash: None,
             stamp: FileStamp::from_path(&path),
         });
-        let header = read_header(&path);
+        let header = read_ply_properties(&path);
         let must_read = header.as_ref().is_some_and(|header| {
             header.size < SMALL_FILE_BYTES
                 || placement.is_reversed
@@ -70,7 +70,7 @@ impl PbrtConverter<'_> {
                 Some(data)
                     if is_compressed || placement.emits || placement.needs_uv && data.uvs.is_empty() =>
                 {
-                    self.convert_mesh_data(data, &stem(&file.text), placement);
+                    self.convert_mesh_data(data, &file_prefix(&file.text), placement);
                     return Ok(());
                 }
                 Some(_) => {}
@@ -132,13 +132,13 @@ fn has_gzip_extension(file: &str) -> bool {
     file.to_lowercase().ends_with(".gz")
 }
 
-fn stem(file: &str) -> String {
+fn file_prefix(file: &str) -> String {
     let name = Path::new(file).file_name().unwrap_or_default().to_string_lossy().into_owned();
     name.split('.').next().unwrap_or_default().to_owned()
 }
 
 /// Reads the header of a PLY file. Returns `None` if the file is unreadable, which loading it will report.
-fn read_header(path: &Path) -> Option<MeshFileProperties> {
+fn read_ply_properties(path: &Path) -> Option<MeshFileProperties> {
     /// Maximum size of a header.
     const MAX_HEADER: u64 = 4096;
     let (file, metadata) = crate::system::file::open_regular_file(path).ok()?.ok()?;

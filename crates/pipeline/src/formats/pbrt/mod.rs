@@ -51,7 +51,7 @@ pub(super) fn read_glimt_scene(
 }
 
 /// Converts a scene to a scene file, with its meshes and images in `folder`.
-pub(super) fn convert(
+pub(super) fn import_with_assets(
     path: &Path,
     folder: &str,
     context: &ForeignReadContext<'_>,
@@ -60,7 +60,7 @@ pub(super) fn convert(
     let (ForeignScene { document, notes, substitutions, .. }, copies) =
         read_scene(path, Some(folder), context)?;
     let mut files = read_files_to_copy(copies, context.token)?;
-    let generated = document.generated_files().iter();
+    let generated = document.in_memory_files().iter();
     files.extend(generated.map(|(name, file)| (PathBuf::from(name), file.bytes.to_vec())));
     Ok(ImportedScene { document, files, substitutions, notes })
 }

@@ -44,7 +44,7 @@ impl PbrtConverter<'_> {
                 let shown = escape_and_truncate(&instance.name.text, 40);
                 let error =
                     PbrtError::new(instance.name.span.clone(), format!("there is no object \"{shown}\""));
-                let _ = self.attempt::<()>(Err(error.with_suggestion(near)));
+                let _ = self.value_or_record_error::<()>(Err(error.with_suggestion(near)));
                 continue;
             };
             let matrix = self.still_transform(instance.transform, instance.name.span.clone());

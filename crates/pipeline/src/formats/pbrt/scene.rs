@@ -16,7 +16,7 @@ use crate::formats::foreign::notes::NoteCollector;
 use crate::formats::foreign::{ForeignOptions, MissingAssetMode};
 use crate::formats::model::UsedNames;
 use crate::math::DMat4;
-use crate::scene::{GeneratedFile, SceneDocumentBuilder};
+use crate::scene::{InMemoryFile, SceneDocumentBuilder};
 use crate::system::file::{FileKind, file_kind_and_metadata};
 
 /// Maximum number of errors to report.
@@ -139,13 +139,13 @@ impl<'a> PbrtConverter<'a> {
         let file = self.assets.file.clone();
         self.document.add_comment_above_next_table(format!("{file}, as glimt shows it."));
         let is_rendered = self.convert_settings_and_camera();
-        self.attempt(is_rendered);
+        self.value_or_record_error(is_rendered);
         self.convert_lights();
         self.convert_objects();
     }
 
     /// Records the error of a failed operation, or returns the result of a successful one.
-    pub(super) fn attempt<T>(&mut self, result: PbrtResult<T>) -> Option<T> {
+    pub(super) fn value_or_record_error<T>(&mut self, result: PbrtResult<T>) -> Option<T> {
         match result {
             Ok(value) => Some(value),
             Err(error) => {
@@ -202,7 +202,7 @@ impl<'a> PbrtConverter<'a> {
             ),
         };
         let bytes: Arc<[u8]> = bytes.into();
-        self.document.add_generated_file(name.clone(), GeneratedFile { bytes, hash });
+        self.document.add_in_memory_file(name.clone(), InMemoryFile { bytes, hash });
         self.generated_names.insert(hash, name.clone());
         name
     }

@@ -3,13 +3,13 @@
 use super::lexer::{PbrtError, PbrtResult};
 use super::parameters::{ParameterType, Parameters};
 use super::scene::PbrtConverter;
-use super::state::{Entity, PlacedEntity};
+use super::state::{PlacedEntity, TypedStatement};
 use crate::formats::foreign::transform::{is_mirroring, linear_part};
 use crate::math::{DMat3, DMat4, DVec2, DVec3};
 use crate::scene::nearest::nearest_name;
 
 /// Size, crop and exposure of the film.
-struct Film {
+struct FilmSettings {
     size: [i64; 2],
     /// The rendered part: its first column and row, and the column and row after its last.
     crop: [i64; 4],
@@ -22,7 +22,7 @@ impl PbrtConverter<'_> {
         let statements = self.statements;
         let film = match &statements.film {
             Some(film) => self.read_film(film)?,
-            None => Film { size: [1280, 720], crop: [0, 0, 1280, 720], gain: 1.0 },
+            None => FilmSettings { size: [1280, 720], crop: [0, 0, 1280, 720], gain: 1.0 },
         };
         let exposure = match &statements.camera {
             Some(camera) => exposure_time(&camera.entity.parameters)?,
@@ -41,7 +41,7 @@ impl PbrtConverter<'_> {
         self.convert_camera(&film)
     }
 
-    fn read_film(&mut self, film: &Entity) -> PbrtResult<Film> {
+    fn read_film(&mut self, film: &TypedStatement) -> PbrtResult<FilmSettings> {
         let parameters = &film.parameters;
         if !["rgb", "gbuffer", "spectral"].contains(&&*film.kind.text) {
             let near = nearest_name(&film.kind.text, ["rgb", "gbuffer", "spectral"]);
@@ -69,7 +69,7 @@ impl PbrtConverter<'_> {
             ["filename", "diagonal", "savefp16", "coordinatesystem", "nbuckets", "lambdamin", "lambdamax"];
         parameters.ignore(&ignored);
         parameters.check_all_used()?;
-        Ok(Film { size: [width, height], crop, gain })
+        Ok(FilmSettings { size: [width, height], crop, gain })
     }
 
     fn convert_sampler(&mut self) -> PbrtResult<()> {
@@ -225,10 +225,10 @@ impl PbrtConverter<'_> {
         Ok(())
     }
 
-    fn convert_camera(&mut self, film: &Film) -> PbrtResult<()> {
+    fn convert_camera(&mut self, film: &FilmSettings) -> PbrtResult<()> {
         self.document.start_table("camera");
         let Some(camera) = &self.statements.camera else {
-            return self.convert_view(DMat4::IDENTITY, film, &Lens::PINHOLE, "perspective", 90.0, None);
+            return self.write_camera_keys(DMat4::IDENTITY, film, &Lens::PINHOLE, "perspective", 90.0, None);
         };
         let PlacedEntity { entity, transform } = camera;
         let (parameters, span) = (&entity.parameters, entity.span());
@@ -246,7 +246,7 @@ impl PbrtConverter<'_> {
         };
         let aspect = parameters.optional_float("frameaspectratio")?;
         let screen = parameters.floats("screenwindow")?.to_vec();
-        let window = self.screen_window(film, aspect, &screen, parameters)?;
+        let window = self.screen_window_bounds(film, aspect, &screen, parameters)?;
         let kind = &*entity.kind.text;
         let fov = parameters.float("fov", 90.0)?;
         if !(fov > 0.0 && fov < 180.0) {
@@ -273,14 +273,14 @@ impl PbrtConverter<'_> {
         parameters.ignore(&["shutteropen", "shutterclose", "mapping"]);
         parameters.check_all_used()?;
         let kind = if kind == "spherical" { "panorama" } else { kind };
-        self.convert_view(matrix, film, &lens, kind, fov, Some(window))
+        self.write_camera_keys(matrix, film, &lens, kind, fov, Some(window))
     }
 
     /// Returns the screen window [x0, x1, y0, y1] of the whole film. For a field of view of 90 degrees, it is
     /// on the plane at distance 1.
-    fn screen_window(
+    fn screen_window_bounds(
         &mut self,
-        film: &Film,
+        film: &FilmSettings,
         aspect: Option<f64>,
         screen: &[f64],
         parameters: &Parameters,
@@ -309,10 +309,10 @@ impl PbrtConverter<'_> {
     }
 
     /// Writes the camera's keys. `matrix` transforms from the camera to the world.
-    fn convert_view(
+    fn write_camera_keys(
         &mut self,
         matrix: DMat4,
-        film: &Film,
+        film: &FilmSettings,
         lens: &Lens,
         projection: &str,
         fov: f64,
@@ -390,7 +390,7 @@ impl Lens {
     const PINHOLE: Self = Self { radius: 0.0, focus: 1.0 };
 }
 
-/// Reads `pixelbounds` or `cropwindow`. Returns the crop in pixels, as in [`Film::crop`].
+/// Reads `pixelbounds` or `cropwindow`. Returns the crop in pixels, as in [`FilmSettings::crop`].
 fn read_crop(parameters: &Parameters, [width, height]: [i64; 2]) -> PbrtResult<[i64; 4]> {
     let bounds = parameters.integers("pixelbounds")?;
     let window = match parameters.find("cropwindow") {

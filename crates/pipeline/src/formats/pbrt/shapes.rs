@@ -8,7 +8,7 @@ use super::scene::{LoweredMaterial, PbrtConverter};
 use super::state::ShapeEntity;
 use crate::formats::foreign::meshes::MeshData;
 use crate::formats::foreign::transform::{is_invertible_affine, matrix_value, similarity_scale};
-use crate::formats::rounding::shorten;
+use crate::formats::rounding::shorten_number;
 use crate::math::{DMat4, DVec2, DVec3};
 use crate::scene::nearest::nearest_name;
 use crate::scene::sanitize::escape_and_truncate;
@@ -38,7 +38,7 @@ pub(super) struct MaterialAndPlacement<'a> {
 }
 
 /// A sphere, disk or cylinder around the z axis.
-struct Round {
+struct RoundShape {
     radius: f64,
     z: [f64; 2],
     inner_radius: f64,
@@ -50,7 +50,7 @@ impl PbrtConverter<'_> {
     /// Writes a shape. `group` is the group that contains it.
     pub(super) fn convert_shape(&mut self, shape: &ShapeEntity, group: Option<&str>) {
         let written = self.try_convert_shape(shape, group);
-        self.attempt(written);
+        self.value_or_record_error(written);
     }
 
     fn try_convert_shape(&mut self, shape: &ShapeEntity, group: Option<&str>) -> PbrtResult<()> {
@@ -78,7 +78,7 @@ impl PbrtConverter<'_> {
         };
         let properties = self.shape_properties(shape, data.as_ref(), &matrix, group.is_some())?;
         let Some(properties) = properties else { return Ok(()) };
-        let material = self.material(&shape.material, &shape.material_span, &properties);
+        let material = self.find_or_add_material(&shape.material, &shape.material_span, &properties);
         let (material, needs_uv, has_inside) = match material {
             LoweredMaterial::Table { name, needs_uv, has_inside } => (name, needs_uv, has_inside),
             LoweredMaterial::Invisible => {
@@ -105,7 +105,7 @@ impl PbrtConverter<'_> {
             ("loopsubdiv", Some(data)) => self.convert_subdivided(data, &entity.parameters, &placement)?,
             (_, Some(data)) => self.convert_mesh_data(data, kind, &placement),
             ("plymesh", None) => self.convert_mesh_file(&entity.parameters, &placement)?,
-            (_, None) => self.convert_round(kind, &entity.parameters, &placement)?,
+            (_, None) => self.convert_round_shape(kind, &entity.parameters, &placement)?,
         }
         entity.parameters.check_all_used()
     }
@@ -191,13 +191,13 @@ impl PbrtConverter<'_> {
     }
 
     /// Writes a sphere, a disk or a cylinder.
-    fn convert_round(
+    fn convert_round_shape(
         &mut self,
         kind: &str,
         parameters: &Parameters,
         placement: &MaterialAndPlacement<'_>,
     ) -> PbrtResult<()> {
-        let round = read_round(kind, parameters)?;
+        let round = read_round_shape(kind, parameters)?;
         let is_whole = match kind {
             "sphere" => round.z == [-round.radius, round.radius],
             _ => round.inner_radius == 0.0,
@@ -207,7 +207,7 @@ impl PbrtConverter<'_> {
             && (!placement.is_reversed || kind == "disk")
             && (kind == "sphere" || !placement.needs_uv);
         if !is_plain {
-            let mesh = round_mesh(kind, &round);
+            let mesh = tessellate_round_shape(kind, &round);
             if !is_whole {
                 let text = "a mesh with 128 cells around the axis is used";
                 self.notes.note(&format!("a partial `{kind}`"), text, placement.span.clone());
@@ -242,7 +242,7 @@ impl PbrtConverter<'_> {
         match similarity_scale(&placement.matrix).filter(|_| !placement.needs_uv) {
             Some(scale) => {
                 self.document.set("center", placement.matrix.w_axis.truncate());
-                self.document.set("radius", shorten(radius * scale));
+                self.document.set("radius", shorten_number(radius * scale));
             }
             None => {
                 self.document.set("center", DVec3::ZERO);
@@ -370,14 +370,14 @@ where
 
 /// Returns the area of a sphere, disk or cylinder before its transform.
 pub(super) fn round_shape_area(kind: &str, parameters: &Parameters) -> PbrtResult<f64> {
-    let Round { radius, z: [low, high], inner_radius, azimuth } = read_round(kind, parameters)?;
+    let RoundShape { radius, z: [low, high], inner_radius, azimuth } = read_round_shape(kind, parameters)?;
     Ok(match kind {
         "disk" => 0.5 * azimuth * (radius * radius - inner_radius * inner_radius),
         _ => azimuth * radius * (high - low),
     })
 }
 
-fn read_round(kind: &str, parameters: &Parameters) -> PbrtResult<Round> {
+fn read_round_shape(kind: &str, parameters: &Parameters) -> PbrtResult<RoundShape> {
     let radius = parameters.positive_float("radius", 1.0)?;
     let azimuth = parameters.float("phimax", 360.0)?.clamp(0.0, 360.0).to_radians();
     let z = match kind {
@@ -395,11 +395,11 @@ fn read_round(kind: &str, parameters: &Parameters) -> PbrtResult<Round> {
     if azimuth == 0.0 || kind != "disk" && z[0] == z[1] || inner_radius >= radius {
         return Err(PbrtError::new(parameters.span.clone(), "these parameters leave nothing of the shape"));
     }
-    Ok(Round { radius, z, inner_radius: inner_radius.max(0.0), azimuth })
+    Ok(RoundShape { radius, z, inner_radius: inner_radius.max(0.0), azimuth })
 }
 
 /// Tessellates a round shape, with pbrt's texture coordinates.
-fn round_mesh(kind: &str, round: &Round) -> MeshData {
+fn tessellate_round_shape(kind: &str, round: &RoundShape) -> MeshData {
     let circle = |u: f64| {
         let (sine, cosine) = libm::sincos(u * round.azimuth);
         DVec3::new(cosine, sine, 0.0)

@@ -183,14 +183,14 @@ pub(super) fn rotation(degrees: f64, axis: DVec3, span: &Range<usize>) -> PbrtRe
 
 /// A statement with a type and parameters.
 #[derive(Clone, Debug)]
-pub(super) struct Entity {
+pub(super) struct TypedStatement {
     /// The type, such as `"sphere"`.
     pub(super) kind: Text,
     pub(super) parameters: Parameters,
     pub(super) color_space: ColorSpace,
 }
 
-impl Entity {
+impl TypedStatement {
     /// Span of the directive and the type.
     pub(super) fn span(&self) -> Range<usize> {
         self.parameters.span.clone()
@@ -200,7 +200,7 @@ impl Entity {
 /// A camera, light, texture or other entity with a transform.
 #[derive(Clone, Debug)]
 pub(super) struct PlacedEntity {
-    pub(super) entity: Entity,
+    pub(super) entity: TypedStatement,
     pub(super) transform: MotionTransform,
 }
 
@@ -234,18 +234,18 @@ pub(super) struct ObjectInstance {
 pub(super) struct Statements {
     /// The camera, with the world-to-camera transform.
     pub(super) camera: Option<PlacedEntity>,
-    pub(super) film: Option<Entity>,
-    pub(super) sampler: Option<Entity>,
-    pub(super) filter: Option<Entity>,
-    pub(super) integrator: Option<Entity>,
+    pub(super) film: Option<TypedStatement>,
+    pub(super) sampler: Option<TypedStatement>,
+    pub(super) filter: Option<TypedStatement>,
+    pub(super) integrator: Option<TypedStatement>,
     pub(super) float_textures: HashMap<String, PlacedEntity>,
     pub(super) spectrum_textures: HashMap<String, PlacedEntity>,
     /// Unnamed materials. The first one is pbrt's default material.
-    pub(super) materials: Vec<Entity>,
-    pub(super) named_materials: HashMap<String, Entity>,
-    pub(super) media: HashMap<String, Entity>,
+    pub(super) materials: Vec<TypedStatement>,
+    pub(super) named_materials: HashMap<String, TypedStatement>,
+    pub(super) media: HashMap<String, TypedStatement>,
     pub(super) lights: Vec<PlacedEntity>,
-    pub(super) area_lights: Vec<Entity>,
+    pub(super) area_lights: Vec<TypedStatement>,
     pub(super) shapes: Vec<ShapeEntity>,
     pub(super) objects: Vec<ObjectDefinition>,
     pub(super) instances: Vec<ObjectInstance>,

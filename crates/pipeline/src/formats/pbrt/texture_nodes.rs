@@ -186,7 +186,7 @@ impl<'a> TextureResolver<'a> {
     }
 
     /// Reads a parameter that may be a texture or a constant. Returns `None` if it is absent.
-    pub(super) fn parameter(
+    pub(super) fn texture_or_constant(
         &mut self,
         parameters: &Parameters,
         name: &'static str,
@@ -194,10 +194,10 @@ impl<'a> TextureResolver<'a> {
         space: ColorSpace,
         notes: &mut NoteCollector,
     ) -> PbrtResult<Option<TextureNode>> {
-        self.parameter_at_depth(parameters, name, value, space, notes, 0)
+        self.texture_or_constant_at_depth(parameters, name, value, space, notes, 0)
     }
 
-    fn parameter_at_depth(
+    fn texture_or_constant_at_depth(
         &mut self,
         parameters: &Parameters,
         name: &'static str,
@@ -248,7 +248,7 @@ impl<'a> TextureResolver<'a> {
             let message = format!("there is no {kind} texture \"{shown}\"");
             return Err(PbrtError::new(name.span.clone(), message).with_suggestion(near));
         };
-        let node = self.resolve(texture, value, notes, depth)?;
+        let node = self.resolve_statement(texture, value, notes, depth)?;
         // Each use of a texture duplicates its tree, so the size could grow exponentially with the depth.
         if node.node_count() > MAX_NODES {
             let message = format!("this texture combines more than {MAX_NODES} textures");
@@ -258,7 +258,7 @@ impl<'a> TextureResolver<'a> {
         Ok(node)
     }
 
-    fn resolve(
+    fn resolve_statement(
         &mut self,
         texture: &PlacedEntity,
         value: TextureValueKind,
@@ -269,7 +269,8 @@ impl<'a> TextureResolver<'a> {
         let parameters = &entity.parameters;
         let mut part = |resolver: &mut Self, name: &'static str, default: f64| {
             let space = entity.color_space;
-            let found = resolver.parameter_at_depth(parameters, name, value, space, notes, depth + 1)?;
+            let found =
+                resolver.texture_or_constant_at_depth(parameters, name, value, space, notes, depth + 1)?;
             PbrtResult::Ok(found.unwrap_or(TextureNode::Constant(DVec3::splat(default))))
         };
         let node = match &*entity.kind.text {
@@ -279,14 +280,15 @@ impl<'a> TextureResolver<'a> {
                 // `scale` is a number even in color textures.
                 let space = entity.color_space;
                 let number = TextureValueKind::Number;
-                let scale = self.parameter_at_depth(parameters, "scale", number, space, notes, depth + 1)?;
+                let scale =
+                    self.texture_or_constant_at_depth(parameters, "scale", number, space, notes, depth + 1)?;
                 TextureNode::product(tex, scale.unwrap_or(TextureNode::Constant(DVec3::ONE)))
             }
             "mix" => {
                 let (first, second) = (part(self, "tex1", 0.0)?, part(self, "tex2", 1.0)?);
                 let (space, number) = (entity.color_space, TextureValueKind::Number);
                 let amount =
-                    self.parameter_at_depth(parameters, "amount", number, space, notes, depth + 1)?;
+                    self.texture_or_constant_at_depth(parameters, "amount", number, space, notes, depth + 1)?;
                 let amount = amount.unwrap_or(TextureNode::Constant(DVec3::splat(0.5)));
                 TextureNode::mix(first, second, amount)
             }

@@ -22,7 +22,7 @@ pub(super) enum PbrtTextureUse {
 impl PbrtConverter<'_> {
     /// Returns the value of a color key: a color or a texture reference.
     pub(super) fn color_value(&mut self, node: &TextureNode) -> BuiltValue {
-        let node = &self.without_missing_images(node);
+        let node = &self.with_missing_images_gray(node);
         if let Some(color) = node.as_constant() {
             return shorten_color(color);
         }
@@ -31,7 +31,7 @@ impl PbrtConverter<'_> {
 
     /// Returns the value of a number key: a number or a texture reference.
     pub(super) fn number_value(&mut self, node: &TextureNode) -> BuiltValue {
-        let node = &self.without_missing_images(node);
+        let node = &self.with_missing_images_gray(node);
         if let Some(number) = node.as_constant() {
             return number.x.into();
         }
@@ -40,13 +40,13 @@ impl PbrtConverter<'_> {
     }
 
     /// Replaces missing images with gray if `--missing note` tolerates them.
-    pub(super) fn without_missing_images(&mut self, node: &TextureNode) -> TextureNode {
+    pub(super) fn with_missing_images_gray(&mut self, node: &TextureNode) -> TextureNode {
         if let TextureNode::Image(image) = node
             && self.tolerate_if_missing(&image.file, "image", "gray is used")
         {
             return TextureNode::Constant(DVec3::splat(0.5));
         }
-        let mut of = |part: &TextureNode| self.without_missing_images(part);
+        let mut of = |part: &TextureNode| self.with_missing_images_gray(part);
         match node {
             TextureNode::Constant(_) | TextureNode::Image(_) | TextureNode::Noise { .. } => node.clone(),
             TextureNode::Checker(mapping, parts) => {
@@ -92,11 +92,11 @@ impl PbrtConverter<'_> {
             | TextureNode::Power(..)
             | TextureNode::Bilinear(..) => self.bake_texture(node, usage),
         };
-        self.add_texture_table(keys, &name)
+        self.find_or_add_texture_table(keys, &name)
     }
 
     /// Returns the name of the table with these keys, adding the table if it is new.
-    pub(super) fn add_texture_table(&mut self, keys: TableEntries, wanted: &str) -> String {
+    pub(super) fn find_or_add_texture_table(&mut self, keys: TableEntries, wanted: &str) -> String {
         let identity = format!("{keys:?}");
         if let Some(known) = self.textures.get(&identity) {
             return known.clone();
@@ -118,8 +118,8 @@ impl PbrtConverter<'_> {
         }
         match usage {
             PbrtTextureUse::Color => !image.is_inverted,
-            PbrtTextureUse::Number => !image.is_inverted && self.is_gray_image(image),
-            PbrtTextureUse::Height => self.is_gray_image(image),
+            PbrtTextureUse::Number => !image.is_inverted && self.is_gray_opaque_image(image),
+            PbrtTextureUse::Height => self.is_gray_opaque_image(image),
             PbrtTextureUse::Normal => true,
         }
     }

@@ -26,7 +26,7 @@ use crate::output::write::Durability;
 use crate::protocol::{CheckpointUpdate, Event};
 use crate::settings::CheckpointSettings;
 use crate::sink::EventSink;
-use crate::system::describe_error;
+use crate::system::describe_io_error;
 use crate::system::file::open_regular_file;
 
 /// Extension appended to the output file name.
@@ -219,7 +219,7 @@ fn read_checkpoint_header_and_state(path: &Path) -> Option<(PartHeader, NonFilmR
 fn not_a_checkpoint_message(path: &Path) -> String {
     // Opening a pipe would block.
     open_regular_file(path).map_or_else(
-        |error| format!("cannot be read: {}", describe_error(&error)),
+        |error| format!("cannot be read: {}", describe_io_error(&error)),
         |_| messages::NOT_A_CHECKPOINT.to_owned(),
     )
 }

@@ -137,7 +137,7 @@ impl Checkpointer<'_> {
         }
         let Some((head, there)) = read_checkpoint_header_and_state(&self.path) else {
             return match PartFile::read_header(&self.path) {
-                Err(PartError::Version { .. }) => self.back_up_unless_backup_is_longer(|_| false),
+                Err(PartError::Version { .. }) => self.back_up_unless(|_| false),
                 Ok(head) if head.kind == PartFileKind::Part => {
                     Err(finished_part_conflict_message(&self.path))
                 }
@@ -163,14 +163,14 @@ impl Checkpointer<'_> {
         let is_longer = |aside: &Path| {
             read_checkpoint_header_and_state(aside).is_some_and(|(_, before)| before.seconds >= there.seconds)
         };
-        self.back_up_unless_backup_is_longer(is_longer)
+        self.back_up_unless(is_longer)
     }
 
     /// Moves the checkpoint aside, unless `is_longer` returns true for one that was moved aside earlier.
     ///
     /// # Errors
     /// Returns why it cannot be moved.
-    fn back_up_unless_backup_is_longer(&self, is_longer: impl Fn(&Path) -> bool) -> Result<(), String> {
+    fn back_up_unless(&self, is_longer: impl Fn(&Path) -> bool) -> Result<(), String> {
         let mut aside = self.path.as_os_str().to_owned();
         aside.push(BACKUP_EXTENSION);
         let aside = PathBuf::from(aside);

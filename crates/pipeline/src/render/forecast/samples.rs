@@ -45,7 +45,7 @@ impl ExpectedSamples {
         // Collect the tiles without goals and the overall rate at which their noise decreases.
         let open = |(tile, noise): (usize, &Option<TileNoise>)| {
             noise
-                .filter(|_| goals.tile_has_undecided_half_at(tile, done, *samples))
+                .filter(|_| goals.tile_has_undecided_goal_at(tile, done, *samples))
                 .map(|noise| (tile, noise))
         };
         let tiles: Vec<(usize, TileNoise)> = noise.iter().enumerate().filter_map(open).collect();
@@ -143,7 +143,7 @@ impl NoiseDecay {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::render::noise_goals::tests::film;
+    use crate::render::noise_goals::tests::one_tile_film;
 
     fn decided_goals(
         halves: [(f32, f32); 2],
@@ -152,8 +152,9 @@ mod tests {
     ) -> (CellSampleGoals, ExpectedSamples) {
         let (mut goals, mut expected) = (CellSampleGoals::new_undecided(1), ExpectedSamples::unknown(1));
         let done = [[samples; 2]];
-        let judgement =
-            goals.decide_tile_sample_goals(&film(halves, samples), &done, samples, error).expect("samples");
+        let judgement = goals
+            .decide_tile_sample_goals(&one_tile_film(halves, samples), &done, samples, error)
+            .expect("samples");
         expected.update_predictions(&judgement, &goals, &done);
         (goals, expected)
     }

@@ -201,14 +201,17 @@ impl Fingerprinted for ColorSource {
 impl Fingerprinted for OpacitySource {
     fn add_to_fingerprint(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         let Self { value, cutoff } = self;
-        key.add_f32(*cutoff).add(value, of);
+        key.add_f32(*cutoff).add_with_references(value, of);
     }
 }
 
 impl Fingerprinted for CoatSource {
     fn add_to_fingerprint(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         let Self { weight, roughness, ior, tint } = self;
-        key.add(weight, of).add(roughness, of).add_f32(*ior).add(tint, of);
+        key.add_with_references(weight, of)
+            .add_with_references(roughness, of)
+            .add_f32(*ior)
+            .add_with_references(tint, of);
     }
 }
 
@@ -233,10 +236,10 @@ impl Fingerprinted for ConductorFresnelSource {
     fn add_to_fingerprint(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         match self {
             Self::Schlick(color) => {
-                key.add_usize(0).add(color, of);
+                key.add_usize(0).add_with_references(color, of);
             }
             Self::Index { eta, k } => {
-                key.add_usize(1).add(eta, of).add(k, of);
+                key.add_usize(1).add_with_references(eta, of).add_with_references(k, of);
             }
         }
     }
@@ -262,6 +265,6 @@ impl Fingerprinted for NormalMap {
 impl Fingerprinted for Bump {
     fn add_to_fingerprint(&self, key: &mut FingerprintHasher, of: &FingerprintContext<'_>) {
         let Self { texture, channel, scale } = *self;
-        key.add_f32(scale).add(&NumberSource::Texture { texture, channel }, of);
+        key.add_f32(scale).add_with_references(&NumberSource::Texture { texture, channel }, of);
     }
 }

@@ -10,7 +10,7 @@ use super::super::super::read::{MAX_FOLDER_FILES, is_symlink, similar_file};
 use super::super::super::sanitize::{escape_and_truncate, escape_invisible_chars};
 use super::super::context::Issue;
 use super::KeyInTable;
-use crate::system::describe_error;
+use crate::system::describe_io_error;
 use crate::system::file::{self, FileKind};
 
 impl KeyInTable<'_> {
@@ -51,7 +51,7 @@ impl KeyInTable<'_> {
                     Some(near) => {
                         format!(
                             "did you mean {}?",
-                            escape_invisible_chars(&suggestion_relative_to_scene(text, &near))
+                            escape_invisible_chars(&to_scene_relative_path(text, &near))
                         )
                     }
                     None => "paths are relative to the scene file".to_owned(),
@@ -91,7 +91,7 @@ impl KeyInTable<'_> {
 }
 
 /// Returns a suggested file's path as written in scenes: relative to the scene's folder.
-fn suggestion_relative_to_scene(text: &str, near: &Path) -> String {
+fn to_scene_relative_path(text: &str, near: &Path) -> String {
     let name = near.file_name().unwrap_or(near.as_os_str());
     Path::new(text).with_file_name(name).to_string_lossy().into_owned()
 }
@@ -114,7 +114,7 @@ fn check_regular_file(path: &Path) -> Result<(), (String, bool)> {
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
             Err((format!("file not found: {shown}"), true))
         }
-        Err(error) => Err((format!("cannot read {shown}: {}", describe_error(&error)), false)),
+        Err(error) => Err((format!("cannot read {shown}: {}", describe_io_error(&error)), false)),
     }
 }
 
@@ -126,9 +126,9 @@ mod tests {
     fn suggestions_are_relative_to_the_scene() {
         let near = Path::new("scenes/../assets/textures/bricks.png");
         assert_eq!(
-            suggestion_relative_to_scene("../assets/textures/brick.png", near),
+            to_scene_relative_path("../assets/textures/brick.png", near),
             "../assets/textures/bricks.png"
         );
-        assert_eq!(suggestion_relative_to_scene("brick.png", Path::new("scenes/bricks.png")), "bricks.png");
+        assert_eq!(to_scene_relative_path("brick.png", Path::new("scenes/bricks.png")), "bricks.png");
     }
 }

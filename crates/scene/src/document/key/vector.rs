@@ -97,7 +97,7 @@ impl KeyInTable<'_> {
     }
 
     /// Reads a pair of numbers.
-    pub(in super::super) fn pair(&self) -> Option<Vec2> {
+    pub(in super::super) fn number_pair(&self) -> Option<Vec2> {
         self.numbers("two numbers, [u, v]").map(|[u, v]: [f64; 2]| Vec2::new(u as f32, v as f32))
     }
 

@@ -57,7 +57,7 @@ impl MaterialReader<'_> {
     }
 
     pub(super) fn read_opacity_and_cutoff(&self) -> OpacitySource {
-        let (value, cutoff) = (self.number("opacity"), self.untextured_number("opacity_cutoff"));
+        let (value, cutoff) = (self.number_or_texture("opacity"), self.untextured_number("opacity_cutoff"));
         self.warn_if_ineffective_without("opacity_cutoff", "opacity");
         OpacitySource { value, cutoff }
     }
@@ -67,8 +67,8 @@ impl MaterialReader<'_> {
             self.warn_if_ineffective_without(name, "coat");
         }
         let coat = CoatSource {
-            weight: self.number("coat"),
-            roughness: self.number("coat_roughness"),
+            weight: self.number_or_texture("coat"),
+            roughness: self.number_or_texture("coat_roughness"),
             ior: self.untextured_number("coat_ior"),
             tint: self.color_or_texture("coat_tint"),
         };
@@ -80,8 +80,8 @@ impl MaterialReader<'_> {
         self.warn_if_ineffective_without("clearcoat_roughness", "clearcoat");
         let (coat, clearcoat) = (self.read_coat(), ["clearcoat", "clearcoat_roughness"]);
         let clear = CoatSource {
-            weight: self.number("clearcoat"),
-            roughness: self.number("clearcoat_roughness"),
+            weight: self.number_or_texture("clearcoat"),
+            roughness: self.number_or_texture("clearcoat_roughness"),
             ..CoatSource::NONE
         };
         if !COAT_KEYS.iter().any(|name| self.key(name).is_present()) {

@@ -144,7 +144,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     /// Multiplies values by the transmittance of the media between the vertices and the samples.
     #[cold]
     #[inline(never)]
-    fn attenuate_by_glass(
+    fn attenuate_by_media(
         &self,
         interior_lists: &InteriorListPool,
         samples: &LightSamplePacket,
@@ -341,7 +341,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             active[i] = if contributes { TRUE } else { 0 };
         }
         if let Some(interior_lists) = self.interior_lists.filter(|_| self.aov != PathAov::LitFraction) {
-            values = self.attenuate_by_glass(interior_lists, samples, values);
+            values = self.attenuate_by_media(interior_lists, samples, values);
         }
         (values, simd.movemask(&active) & self.used, response)
     }

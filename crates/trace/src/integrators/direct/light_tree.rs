@@ -358,7 +358,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
                     places[i] = tree.tree_order_position(lights[i]);
                 }
                 let light = (&values, fraction.as_ref());
-                pool.push(*row_number, (rays, ends, traced), &samples.sources, light, &places);
+                pool.push_packet(*row_number, (rays, ends, traced), &samples.sources, light, &places);
             }
             Some(_) | None => {
                 self.trace_and_add_light(

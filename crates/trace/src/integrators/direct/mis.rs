@@ -85,7 +85,7 @@ impl CompetingTechnique {
             LobesToSample::Narrow => {
                 let BsdfValuePacket { wide, narrow, .. } = &response.bsdf;
                 for i in 0..PACKET_SIZE {
-                    let left = narrow_lobe_mis_factor(lane(wide, i), lane(narrow, i), weights[i]);
+                    let left = wide_and_narrow_mis_factor(lane(wide, i), lane(narrow, i), weights[i]);
                     let value = lane(&values, i) * left;
                     set_lane(&mut values, i, value);
                 }
@@ -123,7 +123,7 @@ impl CompetingTechnique {
 /// Factor for reflected light if the MIS weight applies only to the narrow lobe, because rays in a narrow
 /// lobe do not account for wide lobes. With this factor, the AOVs still sum to the beauty image.
 #[inline(always)]
-fn narrow_lobe_mis_factor(wide: Vec3, narrow: Vec3, weight: f32) -> Vec3 {
+fn wide_and_narrow_mis_factor(wide: Vec3, narrow: Vec3, weight: f32) -> Vec3 {
     let part = |wide: f32, narrow: f32| {
         let all = wide + narrow;
         if all > 0.0 { (wide + narrow * weight) / all } else { 0.0 }

@@ -111,7 +111,7 @@ impl DirectLightVertexQueue {
     }
 
     /// Like [`DirectLightVertexQueue::accumulate_arrived_light`], for paths with consecutive slots.
-    pub fn accumulate_arrived_light_from_slot(&mut self, first: u32, accumulator: &mut Accumulator<'_>) {
+    pub fn accumulate_in_consecutive_slots(&mut self, first: u32, accumulator: &mut Accumulator<'_>) {
         accumulator.add_direct_to_consecutive_slots(first, &self.arrived, &self.arrived_diffuse);
     }
 
@@ -128,7 +128,7 @@ impl DirectLightVertexQueue {
     pub fn commit_spare_vertices(&mut self) {
         let (kept, spare) = self.rows.split_at_mut(self.count);
         let Some(row) = spare.first_mut().filter(|row| row.used != 0) else { return };
-        row.retain_lanes(row.used);
+        row.clear_lanes_outside(row.used);
         if row.used.count_ones() >= Self::MIN_OWN_ROW {
             self.count += 1;
             return;
@@ -145,7 +145,7 @@ impl DirectLightVertexQueue {
             }
         }
         if left != 0 {
-            row.retain_lanes(left);
+            row.clear_lanes_outside(left);
             *open = self.count;
             self.count += 1;
         }
@@ -237,7 +237,7 @@ impl DirectLightVertexQueue {
     }
 
     /// Samples lights at the packets of a group and traces the shadow rays. Must be called before
-    /// [`Self::complete_reflected_light`]. `shares_with_paths` is true if continuing paths compete with the
+    /// [`Self::add_lobe_ray_light`]. `shares_with_paths` is true if continuing paths compete with the
     /// light samples.
     pub fn sample_group_lights(
         &mut self,
@@ -273,7 +273,7 @@ impl DirectLightVertexQueue {
 
     /// Adds the light found by lobe rays to the reflected light of packet `index` in the group passed to
     /// [`Self::sample_group_lights`], and returns the sums. `number` is the index of the packet in the queue.
-    pub fn complete_reflected_light(
+    pub fn add_lobe_ray_light(
         &mut self,
         (index, number): (usize, usize),
         tile: &TileContext<'_>,
@@ -349,11 +349,11 @@ impl DirectLightVertexQueue {
 
     /// Whether the light from wide lobes must be summed separately at a packet.
     pub fn splits_lobes(&self, row: &VertexBatch) -> bool {
-        self.choose_lobe_split(row) == ReflectedLightSplit::Mixed
+        self.reflected_light_split(row) == ReflectedLightSplit::Mixed
     }
 
     /// How to divide a packet's reflected light.
-    fn choose_lobe_split(&self, row: &VertexBatch) -> ReflectedLightSplit {
+    fn reflected_light_split(&self, row: &VertexBatch) -> ReflectedLightSplit {
         if self.arrived_diffuse.is_empty() || row.only_specular_before == 0 {
             return ReflectedLightSplit::Unused;
         }
@@ -365,7 +365,7 @@ impl DirectLightVertexQueue {
     }
 
     /// Adds reflected light, and if `splits_lobes` its part from wide lobes, to packet `index` in the group.
-    pub fn add_reflected_light(
+    pub fn add_to_packet_sums(
         &mut self,
         (index, number): (usize, usize),
         light: &[Vec3x16; 2],
@@ -376,13 +376,13 @@ impl DirectLightVertexQueue {
 
     /// Adds the reflected light of packet `index` in the group to its paths. A path has two vertices at a
     /// transmissive surface.
-    pub fn accumulate_reflected_light(&mut self, (index, number): (usize, usize), aov: PathAov) {
+    pub fn add_packet_light_to_paths(&mut self, (index, number): (usize, usize), aov: PathAov) {
         let (row, arrived) = (&self.rows[number], &self.sums[index]);
         let light = match aov {
             PathAov::Radiance(_) | PathAov::LitFraction => row.times_throughput(&arrived.light),
             PathAov::TraversalCost => arrived.light,
         };
-        let diffuse = match self.choose_lobe_split(row) {
+        let diffuse = match self.reflected_light_split(row) {
             ReflectedLightSplit::Unused | ReflectedLightSplit::OnlyNarrow => None,
             ReflectedLightSplit::OnlyWide => Some(light),
             ReflectedLightSplit::Mixed => Some(row.times_throughput(&arrived.diffuse)),

@@ -52,7 +52,7 @@ impl ShadowRayQueue {
 
     /// Queues a vertex packet's rays selected by `traced`, along with the tree positions of their lights.
     #[inline(always)]
-    pub fn push(
+    pub fn push_packet(
         &mut self,
         row: u32,
         (rays, ends, traced): (RayPacket, F32x16, u32),

@@ -52,7 +52,7 @@ impl LobeRayWithoutSoftShadows<'_> {
                 let side = if front.dot(ray.direction) > 0.0 { Side::Back } else { Side::Front };
                 let light = world.lights.light_on_primitive(hit.object, hit.shape.primitive, side);
                 let arriving =
-                    light.map_or(Vec3::ZERO, |(_, light)| self.hard_shadow_transmittance(light, rays));
+                    light.map_or(Vec3::ZERO, |(_, light)| self.transmittance_to_light_center(light, rays));
                 sum += radiance * transmittance(distance) * arriving;
             }
             (along, passed) = (world.transmittance_and_continued_ray(&along, &hit, &mut 0).1, distance);
@@ -61,14 +61,14 @@ impl LobeRayWithoutSoftShadows<'_> {
         for (number, light) in world.lights.iter().filter(|(_, light)| light.is_infinite()) {
             let radiance = tile.lobe_ray_radiance_from_infinite_light(Some(number), ray, normal, *pdf);
             if radiance != Vec3::ZERO {
-                sum += radiance * transmittance(f32::MAX) * self.hard_shadow_transmittance(light, rays);
+                sum += radiance * transmittance(f32::MAX) * self.transmittance_to_light_center(light, rays);
             }
         }
         sum
     }
 
     /// Transmittance toward a light's center, or 1 without shadows.
-    fn hard_shadow_transmittance(&self, light: &Light, rays: &mut DirectLightCounters) -> Vec3 {
+    fn transmittance_to_light_center(&self, light: &Light, rays: &mut DirectLightCounters) -> Vec3 {
         match self.tile.settings.render.shadows {
             ShadowMode::Off => return Vec3::ONE,
             ShadowMode::Hard | ShadowMode::Soft => {}

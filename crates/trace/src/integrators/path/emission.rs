@@ -46,7 +46,7 @@ impl CameraPathWavefront<'_, '_> {
             let Some(hit) = packet.hit(lane) else { continue };
             let index = tile.world.material_index(&hit);
             if known.is_none_or(|(own, ..)| own != index) {
-                known = tile.packet_material_if_plain(index).map(|(material, _)| {
+                known = tile.plain_material_for_packets(index).map(|(material, _)| {
                     let ambient = material.ambient.filter(|_| has_ambient);
                     (index, material.emission, ambient.map(|ambient| render.ambient * ambient))
                 });
@@ -84,7 +84,7 @@ impl CameraPathWavefront<'_, '_> {
     /// Adds a plain surface's emission and ambient light.
     pub(super) fn add_emission_and_ambient(&mut self, path: &PathRay, hit: &Hit, is_shining: bool) {
         let index = self.tile.world.material_index(hit);
-        let Some((material, _)) = self.tile.packet_material_if_plain(index) else { return };
+        let Some((material, _)) = self.tile.plain_material_for_packets(index) else { return };
         if is_shining {
             self.add_weighted_emission(path, material.emission, self.tile.emitter_mis_weight(path, hit));
         }
@@ -96,7 +96,7 @@ impl CameraPathWavefront<'_, '_> {
     }
 
     /// Adds the emission of a surface and returns whether the path may scatter at the surface.
-    pub(super) fn add_path_emission(
+    pub(super) fn add_emission_and_may_scatter(
         &mut self,
         path: &PathRay,
         vertex: &SurfaceVertex<'_>,

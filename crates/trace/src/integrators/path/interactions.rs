@@ -14,7 +14,8 @@ use crate::integrators::transport::ray::PathRay;
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::transport::vertex::{SpecularLobe, SurfaceVertex};
 use crate::integrators::transport::walk::{
-    Interaction, Interface, NullInteractionOutcome, OpaqueSurfaceHit, PathStepper, walk_to_interaction,
+    MediumInterface, NullInteractionOutcome, OpaqueSurfaceHit, PathStepper, ReachedInteraction,
+    walk_to_interaction,
 };
 use crate::integrators::view::PathAov;
 use crate::materials::{Bsdf, Mirror, SpecularOverBase, ThinDielectric};
@@ -42,13 +43,13 @@ impl<'a> PathStepper<'a> for CameraPathWavefront<'a, '_> {
     }
 
     #[inline(always)]
-    fn handle_interaction(&mut self, path: &PathRay, reached: Interaction<'_, 'a>, has_passed: bool) {
+    fn handle_interaction(&mut self, path: &PathRay, reached: ReachedInteraction<'_, 'a>, has_passed: bool) {
         match reached {
-            Interaction::Opaque(vertex, hit, far) => {
+            ReachedInteraction::Opaque(vertex, hit, far) => {
                 if !has_passed && matches!(hit, OpaqueSurfaceHit::Direct(_)) {
                     self.record_camera_vertex(path, vertex);
                 }
-                if self.add_path_emission(path, vertex, hit) && vertex.scatters() {
+                if self.add_emission_and_may_scatter(path, vertex, hit) && vertex.scatters() {
                     match &vertex.material.bsdf {
                         Bsdf::NonSpecular(rough) => self.shade_non_specular(path, vertex, rough, far),
                         Bsdf::Mirror(mirror) => self.shade_mirror_hit(path, vertex, mirror),
@@ -60,20 +61,20 @@ impl<'a> PathStepper<'a> for CameraPathWavefront<'a, '_> {
                     }
                 }
             }
-            Interaction::Glass(vertex, hit, Interface { far, rough }) => {
+            ReachedInteraction::Glass(vertex, hit, MediumInterface { far, rough }) => {
                 if !has_passed {
                     self.record_camera_vertex(path, vertex);
                 }
-                if self.add_path_emission(path, vertex, OpaqueSurfaceHit::Direct(hit)) {
+                if self.add_emission_and_may_scatter(path, vertex, OpaqueSurfaceHit::Direct(hit)) {
                     match rough {
                         Some(rough) => self.queue_rough_glass_vertices(path, vertex, rough, far),
                         None => self.shade_glass_hit(path, vertex, far),
                     }
                 }
             }
-            Interaction::Hidden if self.is_below_max_depth() => self.push_specular(*path),
-            Interaction::Hidden => {}
-            Interaction::Nothing => self.add_mis_weighted_infinite_light(path),
+            ReachedInteraction::Hidden if self.is_below_max_depth() => self.push_specular(*path),
+            ReachedInteraction::Hidden => {}
+            ReachedInteraction::Nothing => self.add_mis_weighted_infinite_light(path),
         }
     }
 
@@ -92,7 +93,7 @@ impl<'a> PathStepper<'a> for CameraPathWavefront<'a, '_> {
         let tint = vertex.pane_transmittance(path, pane, &mut self.counters.texture_lookups);
         let left = tint * (1.0 - reflectance);
         // After the last bounce, only light that passes straight through the pane is added.
-        if !self.add_path_emission(path, vertex, hit) {
+        if !self.add_emission_and_may_scatter(path, vertex, hit) {
             return NullInteractionOutcome::Passed(left);
         }
         let shading = vertex.perturbed_and_smooth_normals(self.counters);

@@ -21,7 +21,7 @@ impl CameraPathWavefront<'_, '_> {
     }
 
     /// Stores the ray cones at the vertices of plain surfaces, if ray cones are used.
-    pub(super) fn store_cones(&mut self, rays: &PacketSource<'_>, packet: &PacketHits) {
+    pub(super) fn store_plain_surface_cones(&mut self, rays: &PacketSource<'_>, packet: &PacketHits) {
         if self.tile.camera_cone.is_some() {
             for lane in set_bit_lanes(packet.plain) {
                 let Some(hit) = packet.hit(lane) else { continue };

@@ -139,7 +139,7 @@ impl PhotonWavefront<'_> {
                 let (point, normal) = row.surface_point_and_normal(i);
                 self.store_photon(&rays[i], point, normal);
             }
-            row.retain_lanes(row.only_specular_before);
+            row.clear_lanes_outside(row.only_specular_before);
             for i in set_bit_lanes(row.used & row.has_facet) {
                 let counts = row.adjoint_photon_weight(i, -rays[i].ray.direction);
                 set_lane(&mut row.throughput, i, rays[i].throughput * counts);

@@ -166,7 +166,7 @@ impl PhotonPassTracer {
             let radii = radii.collect::<Result<Vec<_>, _>>()?;
             own.radii.iter_mut().zip(radii).for_each(|(own, radius)| *own = radius);
         }
-        let first = own.build_maps(&sent, 0, token)?;
+        let first = own.build_maps_from_photons(&sent, 0, token)?;
         Ok((own, first))
     }
 
@@ -197,11 +197,11 @@ impl PhotonPassTracer {
         token: &CancelToken,
     ) -> Result<PhotonPass, Canceled> {
         let sent = self.trace_photons((world, settings), number, &ignore_progress, token)?;
-        self.build_maps(&sent, number, token)
+        self.build_maps_from_photons(&sent, number, token)
     }
 
     /// Builds the photon maps for a pass.
-    fn build_maps(
+    fn build_maps_from_photons(
         &self,
         sent: &StoredPhotons,
         number: u32,
@@ -224,7 +224,7 @@ impl PhotonPassTracer {
     ///
     /// # Errors
     /// [`Canceled`] if the token is canceled.
-    pub fn trace_passes(
+    pub fn trace_passes_for_samples(
         &self,
         world: &World,
         settings: &RenderSettings,

@@ -38,7 +38,7 @@ impl PathDiffuseFractions {
     }
 
     /// Starts the next bounce.
-    pub fn start_next_bounce(&mut self) {
+    pub fn advance_to_next_bounce(&mut self) {
         std::mem::swap(&mut self.current, &mut self.next);
         self.next.clear();
     }

@@ -148,7 +148,7 @@ impl VertexBatch {
     }
 
     /// Keeps only the vertices in the mask `these`.
-    pub fn retain_lanes(&mut self, these: u32) {
+    pub fn clear_lanes_outside(&mut self, these: u32) {
         let Self { used, has_horizon, may_lift, has_facet, only_specular_before, after_gloss, .. } = self;
         for bits in [used, has_horizon, may_lift, has_facet, only_specular_before, after_gloss] {
             *bits &= these;
@@ -389,7 +389,7 @@ mod tests {
         };
         let plain = VertexBatch { used: ALL, ..VertexBatch::empty() };
         let mut row = noisy;
-        row.retain_lanes(0b11);
+        row.clear_lanes_outside(0b11);
         row.copy_vertex_from(2, &plain, 7);
         row.copy_vertex_from(3, &VertexBatch { only_specular_before: 1 << 9, ..plain.clone() }, 9);
         let bits = [

@@ -54,7 +54,7 @@ impl TileContext<'_> {
     pub fn fill_camera_packets(&self, slots: Range<u32>, rows: &mut Vec<CameraRayPacket>) {
         rows.clear();
         let count = slots.len().div_ceil(PACKET_SIZE).min(CAMERA_ROWS);
-        self.world.geometry.instruction_set().run(GenerateCameraRays {
+        self.world.geometry.instruction_set().run(CameraRayKernel {
             tile: self,
             first: slots.start,
             count,
@@ -118,14 +118,14 @@ impl TileContext<'_> {
 }
 
 /// Kernel that generates several packets of camera rays.
-struct GenerateCameraRays<'a> {
+struct CameraRayKernel<'a> {
     tile: &'a TileContext<'a>,
     first: u32,
     count: usize,
     rows: &'a mut Vec<CameraRayPacket>,
 }
 
-impl SimdKernel for GenerateCameraRays<'_> {
+impl SimdKernel for CameraRayKernel<'_> {
     type Output = ();
 
     #[inline(always)]

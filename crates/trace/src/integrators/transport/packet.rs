@@ -95,7 +95,11 @@ impl TileContext<'_> {
     ///
     /// # Errors
     /// [`Canceled`] if the token is canceled.
-    pub fn closest_hits(&self, rays: &[PathRay], hits: &mut Vec<Option<Hit>>) -> Result<(), Canceled> {
+    pub fn closest_hits_of_queue(
+        &self,
+        rays: &[PathRay],
+        hits: &mut Vec<Option<Hit>>,
+    ) -> Result<(), Canceled> {
         hits.clear();
         hits.resize(rays.len(), None);
         for (paths, hits) in rays.chunks(POLL_INTERVAL).zip(hits.chunks_mut(POLL_INTERVAL)) {
@@ -139,7 +143,7 @@ impl TileContext<'_> {
 
     /// Packet-shading data and non-specular BSDF of a material, or `None` if the material is not plain.
     #[inline(always)]
-    pub fn packet_material_if_plain(
+    pub fn plain_material_for_packets(
         &self,
         material: usize,
     ) -> Option<(&PacketShadingMaterial, &NonSpecular)> {
@@ -278,7 +282,7 @@ impl PacketIntersector<'_> {
         let mut plain =
             PlainSurfaceMasks { all: 0, shining: 0, two_sided: 0, black_from_behind: 0, lookups: 0 };
         while left != 0 {
-            let (id, of_object) = first_index_and_matching_lanes(object, left, simd);
+            let (id, of_object) = first_value_and_matching_lanes(object, left, simd);
             left &= !of_object;
             if tile.world.object_uses_vertex_colors(id) {
                 continue;
@@ -289,9 +293,9 @@ impl PacketIntersector<'_> {
             let mut groups = ArrayVec::<(&NonSpecular, bool, u32), PACKET_SIZE>::new();
             let mut waiting = of_object;
             while waiting != 0 {
-                let (material, alike) = first_index_and_matching_lanes(&materials, waiting, simd);
+                let (material, alike) = first_value_and_matching_lanes(&materials, waiting, simd);
                 waiting &= !alike;
-                let Some((material, rough)) = tile.packet_material_if_plain(material as usize) else {
+                let Some((material, rough)) = tile.plain_material_for_packets(material as usize) else {
                     continue;
                 };
                 if plain.all | of == 0 {
@@ -349,7 +353,7 @@ impl PacketIntersector<'_> {
 /// Returns the index stored in the first lane in `left`, and the mask of lanes in `left` that have the same
 /// index.
 #[inline(always)]
-fn first_index_and_matching_lanes(indices: &[u32; PACKET_SIZE], left: u32, simd: impl Simd) -> (u32, u32) {
+fn first_value_and_matching_lanes(indices: &[u32; PACKET_SIZE], left: u32, simd: impl Simd) -> (u32, u32) {
     let index = indices[left.trailing_zeros() as usize % PACKET_SIZE];
     let mut of = [0; PACKET_SIZE];
     for lane in 0..PACKET_SIZE {
@@ -384,7 +388,7 @@ impl TileContext<'_> {
     ) -> u32 {
         let mut found = 0;
         while left != 0 {
-            let (id, of_object) = first_index_and_matching_lanes(object, left, simd);
+            let (id, of_object) = first_value_and_matching_lanes(object, left, simd);
             left &= !of_object;
             let shown_object = &self.world.geometry.objects()[id as usize];
             // A single hit on a shape is cheaper to evaluate separately.
@@ -394,7 +398,7 @@ impl TileContext<'_> {
             let materials = self.world.packet_material_indices(id, of_object, &hits.primitive);
             let (mut of, mut waiting) = (0, of_object);
             while waiting != 0 {
-                let (material, alike) = first_index_and_matching_lanes(&materials, waiting, simd);
+                let (material, alike) = first_value_and_matching_lanes(&materials, waiting, simd);
                 waiting &= !alike;
                 of |= if self.surface_packet_suffices_for_material(material as usize) { alike } else { 0 };
             }

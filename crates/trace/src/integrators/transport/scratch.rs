@@ -37,7 +37,7 @@ impl HitsByObject {
 
     /// Groups the queue indices by the object hit. Rays without a hit are last. Each group keeps the queue
     /// order.
-    pub fn sort(&mut self, hits: &[Option<Hit>]) {
+    pub fn group_hits_by_object(&mut self, hits: &[Option<Hit>]) {
         let kind = |hit: &Option<Hit>| hit.map_or(Self::GROUPS, |hit| hit.object as usize % Self::GROUPS);
         let mut starts = [0_u32; Self::GROUPS + 2];
         for hit in hits {
@@ -72,10 +72,10 @@ mod tests {
         let hits: Vec<Option<Hit>> = [5, 9, 0, 5, 63, 9, 0, 5].map(hit).to_vec();
         let mut object_order = HitsByObject::default();
         for _ in 0..2 {
-            object_order.sort(&hits);
+            object_order.group_hits_by_object(&hits);
             assert_eq!(object_order.grouped_queue_indices(), [2, 6, 0, 3, 7, 4, 1, 5]);
         }
-        object_order.sort(&[]);
+        object_order.group_hits_by_object(&[]);
         assert!(object_order.grouped_queue_indices().is_empty());
     }
 }

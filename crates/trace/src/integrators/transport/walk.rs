@@ -21,11 +21,11 @@ use crate::world::{Hit, MAX_NULL_INTERACTIONS, OffsetPoints};
 pub const MAX_PASSED_SURFACES: usize = 64;
 
 /// The interaction at which a walk ends.
-pub enum Interaction<'v, 'a> {
+pub enum ReachedInteraction<'v, 'a> {
     /// An opaque surface, and the medium behind it.
     Opaque(&'v SurfaceVertex<'a>, OpaqueSurfaceHit, &'v InteriorList),
     /// A boundary between media, at a hit on glass.
-    Glass(&'v SurfaceVertex<'a>, Hit, Interface<'v>),
+    Glass(&'v SurfaceVertex<'a>, Hit, MediumInterface<'v>),
     /// The ray leaves the scene.
     Nothing,
     /// The ray has crossed [`MAX_PASSED_SURFACES`] surfaces without a change of medium.
@@ -34,7 +34,7 @@ pub enum Interaction<'v, 'a> {
 
 /// A boundary between two media.
 #[derive(Clone, Copy)]
-pub struct Interface<'v> {
+pub struct MediumInterface<'v> {
     /// The medium on the far side.
     pub far: &'v InteriorList,
     /// Parameters of a rough boundary, or `None` if the boundary is smooth.
@@ -55,7 +55,7 @@ pub trait PathStepper<'a> {
     /// Handles the interaction that ends a walk. The path contains the incoming ray, in the medium before the
     /// surface, and its throughput includes absorption. `has_passed` is true if the walk crossed any surface
     /// inside glass.
-    fn handle_interaction(&mut self, path: &PathRay, reached: Interaction<'_, 'a>, has_passed: bool);
+    fn handle_interaction(&mut self, path: &PathRay, reached: ReachedInteraction<'_, 'a>, has_passed: bool);
 
     /// Texture lookup counter.
     fn texture_lookup_counter(&mut self) -> &mut u64;
@@ -145,10 +145,10 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
         let has_passed = hidden > 0;
         let Some(hit) = next else {
             way.move_origin_to_last_vertex(path);
-            return stepper.handle_interaction(path, Interaction::Nothing, has_passed);
+            return stepper.handle_interaction(path, ReachedInteraction::Nothing, has_passed);
         };
         if hidden == MAX_PASSED_SURFACES {
-            return stepper.handle_interaction(path, Interaction::Hidden, true);
+            return stepper.handle_interaction(path, ReachedInteraction::Hidden, true);
         }
         let mut vertex = match surface.take() {
             Some(surface) => SurfaceVertex::from_computed_surface(tile, path, &hit, surface),
@@ -188,7 +188,7 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
             let hit = way.rebase_ray_to_last_vertex(path, hit);
             return stepper.handle_interaction(
                 path,
-                Interaction::Opaque(&vertex, OpaqueSurfaceHit::Direct(hit), &far),
+                ReachedInteraction::Opaque(&vertex, OpaqueSurfaceHit::Direct(hit), &far),
                 has_passed,
             );
         }
@@ -207,7 +207,7 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
             {
                 let touched = Hit { shape: ShapeHit { t: hit.shape.t, ..touching.shape }, ..touching };
                 let touched = way.rebase_ray_to_last_vertex(path, touched);
-                let reached = Interaction::Opaque(&vertex, OpaqueSurfaceHit::Touching(touched), &far);
+                let reached = ReachedInteraction::Opaque(&vertex, OpaqueSurfaceHit::Touching(touched), &far);
                 return stepper.handle_interaction(path, reached, has_passed);
             }
             path.path = path.child_path_number(PASSED);
@@ -225,7 +225,7 @@ pub fn walk_to_interaction<'a, W: PathStepper<'a>>(
             let hit = way.rebase_ray_to_last_vertex(path, hit);
             return stepper.handle_interaction(
                 path,
-                Interaction::Glass(&vertex, hit, Interface { far: &far, rough }),
+                ReachedInteraction::Glass(&vertex, hit, MediumInterface { far: &far, rough }),
                 has_passed,
             );
         }

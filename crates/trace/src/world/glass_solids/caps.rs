@@ -1,6 +1,6 @@
 //! Open rims that end at opaque surfaces, where light can reach the other side only through the glass.
 
-use super::parts::{GlassTriangleSelection, OpenGlassParts, RimEdge, all_or_some_triangles_are_glass};
+use super::parts::{GlassParts, GlassTriangleSelection, RimEdge, all_or_some_triangles_are_glass};
 use crate::accel::Bvh;
 use crate::assets::LoadedMesh;
 use crate::control::{CancelToken, Canceled};
@@ -34,11 +34,11 @@ enum OpaqueSurfaceQuery {
 pub(super) fn covered_rim_fractions(
     scene: &Scene,
     meshes: &[&LoadedMesh],
-    parts: &OpenGlassParts,
+    parts: &GlassParts,
     holes: &[&[RimEdge]],
     token: &CancelToken,
 ) -> Result<Vec<f64>, Canceled> {
-    let examined: Vec<Vec<&RimEdge>> = holes.iter().map(|rims| subsample_rim_edges(rims)).collect();
+    let examined: Vec<Vec<&RimEdge>> = holes.iter().map(|rims| evenly_spaced_rim_edges(rims)).collect();
     let queries: Vec<OpaqueSurfaceQuery> =
         examined.iter().flat_map(|rims| rim_edge_queries(parts, rims)).collect();
     if queries.is_empty() {
@@ -59,14 +59,14 @@ pub(super) fn covered_rim_fractions(
 }
 
 /// Returns evenly spaced edges of a hole, at most `MAX_RIM_EDGES`.
-fn subsample_rim_edges(rims: &[RimEdge]) -> Vec<&RimEdge> {
+fn evenly_spaced_rim_edges(rims: &[RimEdge]) -> Vec<&RimEdge> {
     let step = rims.len().div_ceil(MAX_RIM_EDGES).max(1);
     rims.iter().step_by(step).collect()
 }
 
 /// Returns the queries for a hole's edges, [`QUERIES`] per edge.
 fn rim_edge_queries<'a>(
-    parts: &'a OpenGlassParts,
+    parts: &'a GlassParts,
     rims: &'a [&RimEdge],
 ) -> impl Iterator<Item = OpaqueSurfaceQuery> + 'a {
     let middle_of = |rim: &RimEdge| (rim.ends[0] + rim.ends[1]) * 0.5;

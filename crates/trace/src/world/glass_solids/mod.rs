@@ -23,7 +23,7 @@ mod shared_edges;
 use std::collections::{BTreeMap, HashMap};
 
 use cavities::{ClosedSolid, find_cavities};
-use parts::{OpenGlassPart, OpenGlassParts, RimEdge};
+use parts::{GlassPart, GlassParts, RimEdge};
 use shared_edges::{MatchedAndOpenEdges, RimEdgeWithEndpointIds, SharedEdge, find_set_root};
 
 use crate::assets::LoadedMesh;
@@ -84,11 +84,11 @@ impl GlassSolids {
     /// # Errors
     /// [`Canceled`] if the token is canceled.
     pub fn find(scene: &Scene, meshes: &[&LoadedMesh], token: &CancelToken) -> Result<Self, Canceled> {
-        let parts = OpenGlassParts::find_in_scene(scene, meshes, token)?;
+        let parts = GlassParts::find_in_scene(scene, meshes, token)?;
         if parts.list.is_empty() {
             return Ok(Self::default());
         }
-        let mut shared_edges = MatchedAndOpenEdges::match_rims(&parts.list, &parts.rims, token)?;
+        let mut shared_edges = MatchedAndOpenEdges::match_rim_edges(&parts.list, &parts.rims, token)?;
         let groups = PartGroups::from_shared_edges(&parts, &shared_edges);
         // Reopen edges where the relative orientation of two parts differs from the rest of their common
         // border.
@@ -183,7 +183,7 @@ impl GlassSolids {
 fn opaque_cover_flag_per_hole(
     scene: &Scene,
     meshes: &[&LoadedMesh],
-    parts: &OpenGlassParts,
+    parts: &GlassParts,
     holes: &[SurfaceGap],
     token: &CancelToken,
 ) -> Result<Vec<bool>, Canceled> {
@@ -204,7 +204,7 @@ struct PartGroups {
 }
 
 impl PartGroups {
-    fn from_shared_edges(parts: &OpenGlassParts, shared_edges: &MatchedAndOpenEdges) -> Self {
+    fn from_shared_edges(parts: &GlassParts, shared_edges: &MatchedAndOpenEdges) -> Self {
         let mut same: Vec<u32> = (0..parts.list.len() as u32).collect();
         for seam in &shared_edges.joined {
             let [one, other] = seam.parts().map(|part| find_set_root(&mut same, part));
@@ -251,10 +251,10 @@ impl PartGroups {
     }
 
     /// Volume and area of a solid, with all parts oriented like the first part.
-    fn solid_volume_and_area(&self, parts: &OpenGlassParts, members: &[u32]) -> (f64, f64) {
+    fn solid_volume_and_area(&self, parts: &GlassParts, members: &[u32]) -> (f64, f64) {
         let (mut volume, mut area) = (0.0, 0.0);
         for &part in members {
-            let OpenGlassPart { volume: own, area: surface, .. } = &parts.list[part as usize];
+            let GlassPart { volume: own, area: surface, .. } = &parts.list[part as usize];
             volume += if self.flips[part as usize] { -own } else { *own };
             area += surface;
         }
@@ -262,7 +262,7 @@ impl PartGroups {
     }
 
     /// Whether the parts of a closed solid enclose no volume.
-    fn have_zero_volume(&self, parts: &OpenGlassParts, members: &[u32]) -> bool {
+    fn have_zero_volume(&self, parts: &GlassParts, members: &[u32]) -> bool {
         let (volume, area) = self.solid_volume_and_area(parts, members);
         volume.abs() <= NO_VOLUME * area * area.sqrt()
     }
@@ -272,7 +272,7 @@ impl PartGroups {
     fn closed_solid_if_cavity_candidate(
         &self,
         scene: &Scene,
-        parts: &OpenGlassParts,
+        parts: &GlassParts,
         members: &[u32],
     ) -> Option<ClosedSolid> {
         let objects: Vec<u32> = members.iter().map(|&part| parts.list[part as usize].object).collect();
@@ -296,7 +296,7 @@ impl PartGroups {
 
     /// Whether the front of a solid's first part faces inward, as determined from the volume of a closed
     /// solid or from the majority of an open solid's surface.
-    fn is_first_part_inside_out(&self, parts: &OpenGlassParts, members: &[u32], is_closed: bool) -> bool {
+    fn is_first_part_inside_out(&self, parts: &GlassParts, members: &[u32], is_closed: bool) -> bool {
         if is_closed {
             // Smaller volumes are attributed to rounding.
             let (volume, area) = self.solid_volume_and_area(parts, members);
@@ -320,7 +320,7 @@ struct SurfaceGap {
 impl SurfaceGap {
     /// Returns the holes of all solids.
     fn find_per_solid(
-        parts: &OpenGlassParts,
+        parts: &GlassParts,
         groups: &PartGroups,
         all: &[Vec<u32>],
         shared_edges: &MatchedAndOpenEdges,
@@ -337,7 +337,7 @@ impl SurfaceGap {
 
     /// Returns the hole formed by a solid's open edges.
     fn from_open_edges(
-        parts: &OpenGlassParts,
+        parts: &GlassParts,
         groups: &PartGroups,
         members: &[u32],
         mut own: Vec<RimEdgeWithEndpointIds>,

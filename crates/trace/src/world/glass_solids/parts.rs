@@ -21,7 +21,7 @@ pub(super) const ROUNDING: f64 = 16.0 * f32::EPSILON as f64;
 
 /// A glass object that does not enclose a volume on its own.
 #[derive(Clone, Debug)]
-pub(super) struct OpenGlassPart {
+pub(super) struct GlassPart {
     /// Object id.
     pub object: u32,
     /// Surface area.
@@ -52,14 +52,14 @@ pub(super) struct RimEdge {
 
 /// All glass parts in a scene, in coordinates relative to a point near them.
 #[derive(Debug, Default)]
-pub(super) struct OpenGlassParts {
-    pub list: Vec<OpenGlassPart>,
+pub(super) struct GlassParts {
+    pub list: Vec<GlassPart>,
     pub rims: Vec<RimEdge>,
     /// Origin of the coordinates.
     pub origin: DVec3,
 }
 
-impl OpenGlassParts {
+impl GlassParts {
     /// Finds all parts in a scene.
     pub fn find_in_scene(
         scene: &Scene,
@@ -148,7 +148,7 @@ impl OpenGlassParts {
     }
 
     fn begin_part(&mut self, object: u32, (area, volume): (f64, f64), reach: f64) -> u32 {
-        self.list.push(OpenGlassPart { object, area, volume, tolerance: ROUNDING * reach, substance: None });
+        self.list.push(GlassPart { object, area, volume, tolerance: ROUNDING * reach, substance: None });
         self.list.len() as u32 - 1
     }
 

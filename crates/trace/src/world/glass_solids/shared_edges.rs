@@ -1,7 +1,7 @@
 //! Shared edges: pairs of rim edges that belong to the same glass and have the same endpoints but opposite
 //! directions.
 
-use super::parts::{GlassMediumKey, OpenGlassPart, RimEdge};
+use super::parts::{GlassMediumKey, GlassPart, RimEdge};
 use crate::accel::Bvh;
 use crate::control::{CancelToken, Canceled};
 use crate::geometry::Aabb;
@@ -58,13 +58,13 @@ impl SharedEdge {
 impl MatchedAndOpenEdges {
     /// Matches rim edges. If more than two surfaces share an edge, surfaces with glass between them are
     /// paired.
-    pub fn match_rims(
-        parts: &[OpenGlassPart],
+    pub fn match_rim_edges(
+        parts: &[GlassPart],
         rims: &[RimEdge],
         token: &CancelToken,
     ) -> Result<Self, Canceled> {
         let mut edges = Self::default();
-        let sites = MergedEdgeEndpoints::from_rims(parts, rims, token)?;
+        let sites = MergedEdgeEndpoints::from_rim_edges(parts, rims, token)?;
         // Match edges that have both endpoints in common.
         let halves = rims.iter().enumerate().map(|(i, rim)| (*rim, sites.endpoint_ids_of_rim_edge(i)));
         let open = edges.match_equal_edges(parts, halves.collect());
@@ -78,7 +78,7 @@ impl MatchedAndOpenEdges {
     /// Matches edges of the same glass with the same endpoints, and returns the remaining edges.
     fn match_equal_edges(
         &mut self,
-        parts: &[OpenGlassPart],
+        parts: &[GlassPart],
         rims: Vec<RimEdgeWithEndpointIds>,
     ) -> Vec<RimEdgeWithEndpointIds> {
         let half = |(rim, [from, to]): RimEdgeWithEndpointIds| NormalizedRimEdge {
@@ -160,7 +160,7 @@ struct MergedEdgeEndpoints {
 }
 
 impl MergedEdgeEndpoints {
-    fn from_rims(parts: &[OpenGlassPart], rims: &[RimEdge], token: &CancelToken) -> Result<Self, Canceled> {
+    fn from_rim_edges(parts: &[GlassPart], rims: &[RimEdge], token: &CancelToken) -> Result<Self, Canceled> {
         // Merge identical points first.
         let point = |end: usize| rims[end / 2].ends[end % 2];
         let mut order: Vec<usize> = (0..2 * rims.len()).collect();
@@ -206,7 +206,7 @@ impl MergedEdgeEndpoints {
     /// Splits edges at the endpoints of other edges.
     fn split_at_endpoints(
         &self,
-        parts: &[OpenGlassPart],
+        parts: &[GlassPart],
         rims: &[RimEdgeWithEndpointIds],
         token: &CancelToken,
     ) -> Result<Vec<RimEdgeWithEndpointIds>, Canceled> {

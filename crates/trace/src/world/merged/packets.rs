@@ -5,7 +5,7 @@ use super::MergedMeshes;
 use crate::accel::{F32x16, InstructionSet, PACKET_SIZE, SimdKernel};
 use crate::geometry::Ray;
 use crate::geometry::packet::{HitPacket, RayPacket, set_bit_lanes};
-use crate::geometry::triangle_list::TriangleList;
+use crate::geometry::triangle_list::BruteForceTriangles;
 use crate::math::Vec3;
 use crate::math::lanes::{Simd, TRUE};
 
@@ -24,7 +24,7 @@ impl MergedMeshes {
             return self.closest_hit_packet_with_tree(rows, active, ends, found);
         };
         let size = self.bounds().extent();
-        match by.run(ClosestHitIfIncoherentKernel { facets, size, rows, active, ends, found }) {
+        match by.run(TriangleListClosestHitKernel { facets, size, rows, active, ends, found }) {
             Some(0) => {}
             Some(undecided) => self.closest_hit_per_ray(rows, undecided, ends, found),
             None => self.closest_hit_packet_with_tree(rows, active, ends, found),
@@ -74,7 +74,7 @@ impl MergedMeshes {
         };
         let own = except.unwrap_or(&[Self::NO_TRIANGLE; PACKET_SIZE]);
         let size = self.bounds().extent();
-        match by.run(AnyHitIfIncoherentKernel { facets, size, rows, active, ends, except: own }) {
+        match by.run(TriangleListAnyHitKernel { facets, size, rows, active, ends, except: own }) {
             Some([hit, 0]) => hit,
             Some([hit, undecided]) => hit | self.any_hit_one_by_one(rows, undecided, ends, own),
             None => self.any_hit_packet_with_tree(rows, active, ends, except),
@@ -136,10 +136,10 @@ fn are_rays_coherent(rows: &RayPacket, active: u32, size: Vec3, simd: impl Simd)
 /// between directions relative to their length.
 const COHERENCE: f32 = 0.125;
 
-/// Kernel that calls [`TriangleList::update_decided_closest_hits`] for incoherent rays and returns the lanes
+/// Kernel that calls [`BruteForceTriangles::update_decided_closest_hits`] for incoherent rays and returns the lanes
 /// that need an exact test, or returns `None` for coherent rays.
-struct ClosestHitIfIncoherentKernel<'a> {
-    facets: &'a TriangleList,
+struct TriangleListClosestHitKernel<'a> {
+    facets: &'a BruteForceTriangles,
     size: Vec3,
     rows: &'a RayPacket,
     active: u32,
@@ -147,7 +147,7 @@ struct ClosestHitIfIncoherentKernel<'a> {
     found: &'a mut HitPacket,
 }
 
-impl SimdKernel for ClosestHitIfIncoherentKernel<'_> {
+impl SimdKernel for TriangleListClosestHitKernel<'_> {
     type Output = Option<u32>;
 
     #[inline(always)]
@@ -160,10 +160,10 @@ impl SimdKernel for ClosestHitIfIncoherentKernel<'_> {
     }
 }
 
-/// Kernel that calls [`TriangleList::any_hit_and_undecided_masks`] for incoherent rays and returns the hit
+/// Kernel that calls [`BruteForceTriangles::any_hit_and_undecided_masks`] for incoherent rays and returns the hit
 /// lanes and the lanes that need an exact test, or returns `None` for coherent rays.
-struct AnyHitIfIncoherentKernel<'a> {
-    facets: &'a TriangleList,
+struct TriangleListAnyHitKernel<'a> {
+    facets: &'a BruteForceTriangles,
     size: Vec3,
     rows: &'a RayPacket,
     active: u32,
@@ -171,7 +171,7 @@ struct AnyHitIfIncoherentKernel<'a> {
     except: &'a [u32; PACKET_SIZE],
 }
 
-impl SimdKernel for AnyHitIfIncoherentKernel<'_> {
+impl SimdKernel for TriangleListAnyHitKernel<'_> {
     type Output = Option<[u32; 2]>;
 
     #[inline(always)]

@@ -9,7 +9,7 @@ use crate::mosaic::{PLACES, TwoPartBlockPattern};
 
 /// A color that may be set before drawing a cell, and its cost.
 #[derive(Clone, Copy)]
-struct ColorChange {
+struct ColorCandidate {
     shade: TerminalColor,
     /// Number of bytes in the SGR parameters.
     bytes: u32,
@@ -21,7 +21,7 @@ struct ColorChange {
 pub(super) struct ColorChangesToTry {
     mosaic: TwoPartColorCell,
     model: RateDistortionParameters,
-    all: Vec<ColorChange>,
+    all: Vec<ColorCandidate>,
     /// End index of the colors for the first part. Colors for the second part follow, up to `second`.
     first: usize,
     second: usize,
@@ -36,7 +36,7 @@ impl ColorChangesToTry {
         let PartColorCandidates { first, second, both } = candidates;
         let mut changes =
             Self { mosaic, model, all: Vec::new(), first: first.len(), second: first.len() + second.len() };
-        let change = |shade: &TerminalColor| ColorChange {
+        let change = |shade: &TerminalColor| ColorCandidate {
             shade: *shade,
             bytes: shade.sgr_length(),
             errors: changes.color_error_per_part(*shade),
@@ -163,15 +163,15 @@ struct PenWithErrors {
 }
 
 impl PenWithErrors {
-    fn from_changes(fg: &ColorChange, bg: &ColorChange) -> Self {
+    fn from_changes(fg: &ColorCandidate, bg: &ColorCandidate) -> Self {
         Self { fg: fg.shade, fg_errors: fg.errors, bg: bg.shade, bg_errors: bg.errors }
     }
 
-    fn with_fg(self, change: &ColorChange) -> Self {
+    fn with_fg(self, change: &ColorCandidate) -> Self {
         Self { fg: change.shade, fg_errors: change.errors, ..self }
     }
 
-    fn with_bg(self, change: &ColorChange) -> Self {
+    fn with_bg(self, change: &ColorCandidate) -> Self {
         Self { bg: change.shade, bg_errors: change.errors, ..self }
     }
 

@@ -102,7 +102,7 @@ proptest! {
         let mut screen: Vec<Option<TwoPartColorCell>> = targets.iter().map(|target| target.shown).collect();
         for op in &found.ops {
             prop_assert!(targets[op.column].wanted.is_some(), "not part of the preview");
-            prop_assert!(op.glyph.can_show_colors(op.mosaic.pair));
+            prop_assert!(op.glyph.can_represent_color_pair(op.mosaic.pair));
             screen[op.column] = Some(op.mosaic);
         }
         for (shown, target) in screen.iter().zip(&targets) {

@@ -6,10 +6,10 @@ use super::super::written_files::describe_files_of_request;
 use super::record_stage;
 use crate::messages;
 use crate::pipeline::protocol::{
-    Failure, LastValidSceneRenderOutcome, Report, SavedSceneRenderStatus, Stage, Status,
+    Failure, LastValidSceneRenderOutcome, Report, SavedSceneRenderStatus, Stage, StageStatus,
 };
 use crate::scene::diagnostic::Diagnostic;
-use crate::state::{BlockingErrors, RenderState, RequestStatus, SceneImageProgress, State};
+use crate::state::{BlockingErrors, RenderState, RequestStatus, SceneImageRenderProgress, State};
 
 pub(super) fn handle_done(
     state: &mut State,
@@ -28,17 +28,17 @@ pub(super) fn handle_done(
     state.set_clock_paused(false);
     state.work.assets.clear();
     // This request's image has been written, so earlier write failures no longer matter.
-    let is_on_disk = report.stages[Stage::Write as usize].status != Status::Skipped;
+    let is_on_disk = report.stages[Stage::Write as usize].status != StageStatus::Skipped;
     if state.request.has_no_keyboard_overrides() && is_on_disk && state.saving.unwritten.is_none() {
         state.saving.write_failed = None;
-        state.saving.own = SceneImageProgress { state: SavedSceneRenderStatus::Written, fraction: 1.0 };
+        state.saving.own = SceneImageRenderProgress { state: SavedSceneRenderStatus::Written, fraction: 1.0 };
     }
     complete_noise_curve(state, &report, unchanged);
     describe_files_of_request(state, state.request.generation, &report);
     state.work.report = Some(report);
     state.work.unchanged = unchanged;
     set_warnings(state, warnings);
-    history::record_current_image(state);
+    history::record_newest_image(state);
     count_finished_render(state, unchanged);
     if unchanged {
         state.saving.last_edit.take_if(|edit| *edit == state.request.generation);
@@ -53,7 +53,7 @@ pub(super) fn handle_done(
 fn add_seconds_of_earlier_requests(report: &mut Report) {
     let all = report.image.render_seconds;
     let render = &mut report.stages[Stage::Render as usize];
-    if render.status == Status::Done && all > render.seconds {
+    if render.status == StageStatus::Done && all > render.seconds {
         report.seconds += all - render.seconds;
         render.seconds = all;
     }
@@ -78,17 +78,17 @@ fn complete_noise_curve(state: &mut State, report: &Report, unchanged: bool) {
     let render = &report.stages[Stage::Render as usize];
     let origin = state.request.image_provenance(false).without_exposure();
     match render.status {
-        Status::Done => {
+        StageStatus::Done => {
             if let Some(error) = report.image.error {
                 state.work.curve.record_final(render.seconds, error);
             }
             state.work.store_finished_noise_curve(origin);
         }
-        Status::Reused if unchanged || state.request.is_exposure_only => {
+        StageStatus::Reused if unchanged || state.request.is_exposure_only => {
             state.work.curve = state.work.last_curve.clone();
         }
-        Status::Reused => state.work.restore_noise_curve_for_image(&origin),
-        Status::Running | Status::Skipped => {}
+        StageStatus::Reused => state.work.restore_noise_curve_for_image(&origin),
+        StageStatus::Running | StageStatus::Skipped => {}
     }
     state.work.last_curve = state.work.curve.clone();
 }
@@ -122,7 +122,7 @@ pub(super) fn handle_last_valid_render_end(state: &mut State, end: LastValidScen
     match end {
         LastValidSceneRenderOutcome::Finished { unchanged } => {
             state.work.rendering = RenderState::Finished;
-            history::record_current_image(state);
+            history::record_newest_image(state);
             count_finished_render(state, unchanged);
         }
         LastValidSceneRenderOutcome::Stopped => state.work.rendering = RenderState::Stopped,

@@ -412,7 +412,7 @@ fn errors_include_their_location() {
     }
     let mut external = square();
     external["buffers"][0]["uri"] = json!("none.bin");
-    let missing = crate::system::describe_error(&std::io::Error::from_raw_os_error(nix::libc::ENOENT));
+    let missing = crate::system::describe_io_error(&std::io::Error::from_raw_os_error(nix::libc::ENOENT));
     assert_eq!(
         expect_rejection(open_json(&external)).1,
         unreadable_buffer_file_message(&missing, 0, "a.gltf")

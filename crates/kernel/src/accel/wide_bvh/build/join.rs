@@ -17,7 +17,7 @@ pub fn flatten(root: TreePart) -> (Vec<WideNode>, Vec<PackReferenceRange>) {
         }
         root => {
             let bounds = root.bounds();
-            top.add_node_for_part(bounds, root);
+            top.add_nodes_for_part(bounds, root);
         }
     }
     top.into_nodes_and_packs()
@@ -52,7 +52,7 @@ struct UpperNodes {
 
 impl UpperNodes {
     /// Creates the node for a part and all nodes below it, and returns the node's index.
-    fn add_node_for_part(&mut self, bounds: SimdBounds, part: TreePart) -> usize {
+    fn add_nodes_for_part(&mut self, bounds: SimdBounds, part: TreePart) -> usize {
         let place = self.nodes.len();
         self.nodes.push(Vec::new());
         let mut children = vec![(bounds, part)];
@@ -71,7 +71,9 @@ impl UpperNodes {
                     self.subtrees.push(subtree);
                     UpperChild::Subtree(self.subtrees.len() - 1)
                 }
-                halves @ TreePart::Halves(_) => UpperChild::UpperNode(self.add_node_for_part(bounds, halves)),
+                halves @ TreePart::Halves(_) => {
+                    UpperChild::UpperNode(self.add_nodes_for_part(bounds, halves))
+                }
             };
             self.nodes[place].push((bounds, below));
         }
@@ -115,7 +117,7 @@ impl UpperNodes {
                 UpperChild::UpperNode(place) => Child::Inner(place as u32),
                 UpperChild::Subtree(subtree) => starts[subtree].offset_child(self.subtrees[subtree].root),
             };
-            node.set(slot, bounds.aabb(), child);
+            node.set_child(slot, bounds.aabb(), child);
         }
         node
     }

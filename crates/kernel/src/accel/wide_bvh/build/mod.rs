@@ -10,7 +10,7 @@ mod triangle_splits;
 
 use rayon::prelude::*;
 
-use super::Quality;
+use super::BuildQuality;
 use super::node::{TrianglePack, WideNode};
 use crate::accel::reference::{SimdBounds, TriangleReference};
 use crate::control::{CancelToken, Canceled};
@@ -38,14 +38,14 @@ pub struct BuiltWideBvh {
 pub fn build(
     count: u32,
     corners: impl Fn(u32) -> [Vec3; 3] + Sync,
-    quality: Quality,
+    quality: BuildQuality,
     token: &CancelToken,
 ) -> Result<BuiltWideBvh, Canceled> {
     let mut references = TriangleReference::collect_finite(count, &corners, token)?;
     if references.is_empty() {
         return Ok(BuiltWideBvh { nodes: Vec::new(), packs: Vec::new(), bounds: Aabb::EMPTY });
     }
-    if quality == Quality::High {
+    if quality == BuildQuality::High {
         references = triangle_splits::split_large_triangles(&references, &corners, token)?;
     }
     let whole = ReferenceRangeWithSplit::whole(&references);

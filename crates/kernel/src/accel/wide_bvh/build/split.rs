@@ -52,7 +52,7 @@ pub enum Split {
 impl ReferenceRangeWithSplit {
     /// The segment that contains all references.
     pub fn whole(references: &[TriangleReference]) -> Self {
-        let chunks = references.par_chunks(PARALLEL_SIZE / 4).map(ReferenceBounds::around);
+        let chunks = references.par_chunks(PARALLEL_SIZE / 4).map(ReferenceBounds::around_references);
         Self::new(references, chunks.reduce(|| ReferenceBounds::EMPTY, ReferenceBounds::union), 0)
     }
 
@@ -74,7 +74,7 @@ struct ReferenceBounds {
 impl ReferenceBounds {
     const EMPTY: Self = Self { bounds: SimdBounds::EMPTY, centroids: SimdBounds::EMPTY };
 
-    fn around(references: &[TriangleReference]) -> Self {
+    fn around_references(references: &[TriangleReference]) -> Self {
         let mut own = Self::EMPTY;
         for reference in references {
             own.grow(reference, reference.centroid());
@@ -280,7 +280,7 @@ pub fn partition(
         Split::Middle => {
             let middle = references.len() / 2;
             let (left, right) = references.split_at(middle);
-            (middle, ReferenceBounds::around(left), ReferenceBounds::around(right))
+            (middle, ReferenceBounds::around_references(left), ReferenceBounds::around_references(right))
         }
     };
     let level = segment.level + 1;
@@ -388,7 +388,8 @@ mod tests {
         }
         for count in [1, 2, 5, 24, FEW, FEW + 1, 1000] {
             let references = references(count as u32);
-            let bins = BinMapping::new(&ReferenceBounds::around(&references).centroids, references.len());
+            let bins =
+                BinMapping::new(&ReferenceBounds::around_references(&references).centroids, references.len());
             if count <= FEW {
                 assert!(bins.count <= FEW_BINS, "{} bins", bins.count);
                 counts::<FEW_BINS>(&references, &bins);
@@ -401,7 +402,8 @@ mod tests {
     fn simd_partitions_match_scalar_partitions() {
         for count in [1, 2, 5, 33, 1000] {
             let references = references(count);
-            let bins = BinMapping::new(&ReferenceBounds::around(&references).centroids, references.len());
+            let bins =
+                BinMapping::new(&ReferenceBounds::around_references(&references).centroids, references.len());
             for (axis, [by_vectors, plainly]) in PARTITIONS.into_iter().enumerate() {
                 for bin in 1..bins.count {
                     let (mut own, mut plain) = (references.clone(), references.clone());
@@ -418,7 +420,9 @@ mod tests {
                         own[..middle].iter().all(is_left) && !own[middle..].iter().any(is_left),
                         "{axis}"
                     );
-                    let around = |side: &[TriangleReference]| bits(&ReferenceBounds::around(side).centroids);
+                    let around = |side: &[TriangleReference]| {
+                        bits(&ReferenceBounds::around_references(side).centroids)
+                    };
                     assert_eq!(sides.each_ref().map(bits), [around(&own[..middle]), around(&own[middle..])]);
                 }
             }

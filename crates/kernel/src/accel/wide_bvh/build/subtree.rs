@@ -95,7 +95,7 @@ impl WideSubtree {
             let bounds = segment.bounds.aabb();
             let members = &mut references[from..from + segment.count];
             let child = self.build_child(members, start + from, segment);
-            self.nodes[place].set(slot, bounds, child);
+            self.nodes[place].set_child(slot, bounds, child);
         }
         place as u32
     }

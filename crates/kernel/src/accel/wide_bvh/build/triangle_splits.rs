@@ -27,7 +27,7 @@ pub fn split_large_triangles(
     corners: &(impl Fn(u32) -> [Vec3; 3] + Sync),
     token: &CancelToken,
 ) -> Result<Vec<TriangleReference>, Canceled> {
-    let grid = BisectionGrid::around(references);
+    let grid = BisectionGrid::around_references(references);
     let priority = |reference: &TriangleReference| grid.priority(reference, corners(reference.id()));
     let priorities: Vec<f32> = references.par_iter().map(priority).collect();
     let factor = find_priority_scale(&priorities, (references.len() as f64 * MAX_ADDITIONAL) as u64);
@@ -88,7 +88,7 @@ struct GridPlane {
 }
 
 impl BisectionGrid {
-    fn around(references: &[TriangleReference]) -> Self {
+    fn around_references(references: &[TriangleReference]) -> Self {
         let all = SimdBounds::around_references(references);
         Self { start: all.min.truncate(), extent: all.extent().truncate() }
     }

@@ -3,7 +3,7 @@
 
 use std::arch::x86_64::*;
 
-use super::triangle::{self, Hits};
+use super::triangle::{self, TriangleHits};
 use super::vector::{SimdF32x4, SimdF32x8, SimdVector};
 use crate::accel::wide_bvh::node::{TrianglePack, WideNode};
 use crate::geometry::aabb::{FAR_PAD, TRIANGLE_ERROR};
@@ -211,12 +211,12 @@ impl SimdRay {
 
     /// Tests the triangles of a pack, except the ray's start triangle.
     #[inline(always)]
-    pub fn intersect_pack(&self, pack: &TrianglePack, t_max: f32) -> Hits<SimdF32x4> {
+    pub fn intersect_triangles(&self, pack: &TrianglePack, t_max: f32) -> TriangleHits<SimdF32x4> {
         let corners =
             [self.sheared_corner(pack, 0), self.sheared_corner(pack, 3), self.sheared_corner(pack, 6)];
         let hits = triangle::intersect(&corners, self.shear[2], self.shear[2].splat_like(t_max), true);
         let others = !self.start_triangle_lane_mask(pack);
-        Hits { hit: hits.hit & others, doubtful: hits.doubtful & others, ..hits }
+        TriangleHits { hit: hits.hit & others, doubtful: hits.doubtful & others, ..hits }
     }
 
     /// Mask of the lane that contains the ray's start triangle.

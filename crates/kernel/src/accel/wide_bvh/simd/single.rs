@@ -5,7 +5,7 @@ use std::arch::x86_64::*;
 use super::portable::update_nearest_with_triangle;
 use super::ray::{SimdRay, is_traceable};
 use super::stack::{Stack, entry_distance_from_key, sort_key};
-use super::triangle::Hits;
+use super::triangle::TriangleHits;
 use super::vector::{SimdF32x4, SimdF32x8, SimdVector};
 use crate::accel::wide_bvh::WideBvh;
 use crate::accel::wide_bvh::node::{Child, LEAF_BITS, PACK, TrianglePack, WideNode};
@@ -39,7 +39,7 @@ pub fn closest_hit(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
             }
             Child::Leaf { first, count } => {
                 for pack in &tree.packs[first as usize..(first + count) as usize] {
-                    let hits = lines.intersect_pack(pack, t_max);
+                    let hits = lines.intersect_triangles(pack, t_max);
                     if hits.hit | hits.doubtful != 0 {
                         update_nearest_with_pack_hits(pack, &hits, ray, &mut best, t_max);
                         t_max = best.map_or(t_max, |best| best.t);
@@ -63,7 +63,7 @@ pub fn closest_hit(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
 #[inline]
 fn update_nearest_with_pack_hits(
     pack: &TrianglePack,
-    hits: &Hits<SimdF32x4>,
+    hits: &TriangleHits<SimdF32x4>,
     ray: &Ray,
     best: &mut Option<ShapeHit>,
     t_max: f32,
@@ -186,7 +186,7 @@ pub fn any_hit(tree: &WideBvh, ray: &Ray, except: Option<u32>) -> bool {
             }
             Child::Leaf { first, count } => {
                 for pack in &tree.packs[first as usize..(first + count) as usize] {
-                    let hits = lines.intersect_pack(pack, ray.t_max);
+                    let hits = lines.intersect_triangles(pack, ray.t_max);
                     let mut lanes = hits.hit | hits.doubtful;
                     while lanes != 0 {
                         let lane = lanes.trailing_zeros() as usize % PACK;

@@ -9,7 +9,7 @@ use crate::math::float::gamma;
 pub type ShearedCorners<V> = [[V; 3]; 3];
 
 /// Results of testing a ray against a pack, or a packet against a triangle.
-pub struct Hits<V: SimdVector> {
+pub struct TriangleHits<V: SimdVector> {
     /// Mask of the lanes with a hit.
     pub hit: u32,
     /// Mask of the lanes that must be retested in higher precision, because an edge function is exactly 0,
@@ -29,7 +29,7 @@ pub fn intersect<V: SimdVector>(
     shear_z: V,
     t_max: V,
     is_single: bool,
-) -> Hits<V> {
+) -> TriangleHits<V> {
     let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = *corners;
     let (wa, wb, wc) = (cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax);
     let zero = ax.splat_like(0.0);
@@ -38,13 +38,13 @@ pub fn intersect<V: SimdVector>(
     let on_edge = min.eq(zero) | max.eq(zero);
     let determinant = wa + wb + wc;
     let along = (wa * az + wb * bz + wc * cz) * shear_z;
-    let none = Hits { hit: 0, doubtful: 0, t: zero, u: zero, v: zero };
+    let none = TriangleHits { hit: 0, doubtful: 0, t: zero, u: zero, v: zero };
     let candidate = if is_single {
         on_edge | may_be_in_range_mask(corners, determinant, shear_z, along, t_max)
     } else {
         zero.le(zero)
     };
-    if V::movemask(V::and_not(candidate, outside)) == 0 {
+    if V::movemask(V::mask_difference(candidate, outside)) == 0 {
         return none;
     }
     let inverse = ax.splat_like(1.0).div(determinant);
@@ -53,9 +53,9 @@ pub fn intersect<V: SimdVector>(
     let (error, reach) = distance_error_and_corner_max_t(corners, shear_z, inverse);
     let needle = (reach * reach.splat_like(ILL_CONDITIONED)).lt(error);
     let at_start = t.abs().le(error);
-    let doubtful = V::movemask(V::and_not(needle | at_start | on_edge, outside));
-    let hit = V::movemask(V::and_not(ahead, outside)) & !doubtful;
-    Hits { hit, doubtful, t, u: wb * inverse, v: wc * inverse }
+    let doubtful = V::movemask(V::mask_difference(needle | at_start | on_edge, outside));
+    let hit = V::movemask(V::mask_difference(ahead, outside)) & !doubtful;
+    TriangleHits { hit, doubtful, t, u: wb * inverse, v: wc * inverse }
 }
 
 /// Unit roundoff divided by the needle ratio, slightly enlarged to account for rounding in

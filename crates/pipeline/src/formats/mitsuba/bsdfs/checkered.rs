@@ -4,7 +4,7 @@ use super::{BsdfContext, MaterialBuilder};
 use crate::formats::foreign::import::TableEntries;
 use crate::formats::mitsuba::graph::PluginInstance;
 use crate::formats::mitsuba::reader::{NumberSource, SceneReader, luminance};
-use crate::formats::rounding::shorten as shorten_number;
+use crate::formats::rounding::shorten_number;
 use crate::math::{DMat4, DVec3};
 use crate::scene::BuiltValue;
 
@@ -77,8 +77,8 @@ impl<'a> SceneReader<'a> {
             }
         }
         let (board, _) = board?;
-        let keys = self.checker_keys(board, [DVec3::ZERO, DVec3::ONE], context.uv);
-        Some((cells, self.add_texture_table(keys, "cells", [board.span.clone(), board.span.clone()])))
+        let keys = self.checker_keys_with_colors(board, [DVec3::ZERO, DVec3::ONE], context.uv);
+        Some((cells, self.find_or_add_texture_table(keys, "cells", [board.span.clone(), board.span.clone()])))
     }
 
     /// Converts a conductor whose `alpha_u` or `alpha_v` is a checkerboard to a blend of two metals. `keys` are

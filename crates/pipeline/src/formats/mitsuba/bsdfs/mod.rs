@@ -4,12 +4,12 @@ mod checkered;
 mod nested;
 mod surfaces;
 
-use super::graph::{Child, ObjectIndex, ObjectKind, PluginInstance};
-use super::material_key::{MaterialKey, UvConvention};
+use super::graph::{Child, NodeIndex, ObjectKind, PluginInstance};
+use super::material_key::{MaterialKey, UvFlips};
 use super::reader::{ColorRole, ColorSource, NumberSource, SceneReader, luminance};
 use super::textures::MitsubaTextureUse;
 use crate::formats::foreign::import::TableEntries;
-use crate::formats::rounding::{shorten as shorten_number, shorten_color};
+use crate::formats::rounding::{shorten_color, shorten_number};
 use crate::math::DVec3;
 use crate::scene::BuiltValue;
 
@@ -49,13 +49,13 @@ const KNOWN_BSDFS: [&str; 26] = [
 /// Context inherited by a nested BSDF.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct BsdfContext {
-    uv: UvConvention,
+    uv: UvFlips,
     /// Whether a `twosided` contains the BSDF.
     is_two_sided: bool,
     /// The `mask` that contains the BSDF.
-    mask: Option<ObjectIndex>,
+    mask: Option<NodeIndex>,
     /// The `coating` that contains the BSDF.
-    coat: Option<ObjectIndex>,
+    coat: Option<NodeIndex>,
     depth: u32,
 }
 
@@ -100,15 +100,15 @@ impl<'a> SceneReader<'a> {
     pub(super) fn material(
         &mut self,
         bsdf: Option<&'a Child>,
-        emitter: Option<ObjectIndex>,
-        uv: UvConvention,
+        emitter: Option<NodeIndex>,
+        uv: UvFlips,
         shape: &'a PluginInstance,
     ) -> Option<String> {
         let index = bsdf.map(|child| child.target);
         let has_textures = self.any_nested_object_satisfies(index.into_iter().chain(emitter), |inner| {
             inner.kind == ObjectKind::Texture
         });
-        let uv = if has_textures { uv } else { UvConvention::default() };
+        let uv = if has_textures { uv } else { UvFlips::default() };
         let mesh = self.attributes.as_ref().map(|mesh| mesh.id);
         let tint = self.interior_tint.map(|tint| tint.to_array().map(f64::to_bits));
         let key = MaterialKey { bsdf: index, emitter, uv, mesh, tint };
@@ -162,8 +162,8 @@ impl<'a> SceneReader<'a> {
     fn add_emission(
         &mut self,
         builder: &mut MaterialBuilder,
-        emitter: ObjectIndex,
-        uv: UvConvention,
+        emitter: NodeIndex,
+        uv: UvFlips,
         shape: &'a PluginInstance,
     ) {
         let index = emitter;
@@ -181,7 +181,7 @@ impl<'a> SceneReader<'a> {
             // Use a black surface, which only emits.
             *builder = MaterialBuilder::one_sided("phong", vec![("diffuse", 0.0.into())]);
         }
-        match self.color(emitter, "radiance", ColorRole::Emission, 1.0) {
+        match self.color_or_texture(emitter, "radiance", ColorRole::Emission, 1.0) {
             ColorSource::Constant(color) => {
                 if color != DVec3::ZERO {
                     builder.keys.push(("emission", shorten_color(color)));
@@ -204,7 +204,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Converts a BSDF. Returns `None` after an error.
-    fn bsdf(&mut self, index: ObjectIndex, context: BsdfContext) -> Option<MaterialBuilder> {
+    fn bsdf(&mut self, index: NodeIndex, context: BsdfContext) -> Option<MaterialBuilder> {
         let object = self.object_by_index(index);
         if context.depth > MAX_DEPTH {
             self.report_error(object.span.clone(), "BSDFs are nested too deeply", None);
@@ -261,7 +261,7 @@ impl<'a> SceneReader<'a> {
             "measured" => return self.refuse_bsdf(object, "measured BSDFs"),
             "hk" | "irawan" => return self.refuse_bsdf(object, "this BSDF"),
             _ => {
-                self.unknown_plugin(object, "BSDF", &KNOWN_BSDFS);
+                self.report_unknown_plugin(object, "BSDF", &KNOWN_BSDFS);
                 None
             }
         };
@@ -290,7 +290,7 @@ impl<'a> SceneReader<'a> {
         default: f64,
         context: BsdfContext,
     ) -> BuiltValue {
-        let color = self.color(object, name, ColorRole::Reflectance, default);
+        let color = self.color_or_texture(object, name, ColorRole::Reflectance, default);
         self.color_value(color, context, 1.0)
     }
 
@@ -299,7 +299,7 @@ impl<'a> SceneReader<'a> {
         match color {
             ColorSource::Constant(color) => shorten_color(color * factor),
             ColorSource::Texture(texture) => {
-                match self.texture_with_factor(texture, MitsubaTextureUse::Color, context.uv, factor) {
+                match self.find_or_add_scaled_texture(texture, MitsubaTextureUse::Color, context.uv, factor) {
                     Some(name) => BuiltValue::Table(vec![("texture", name.into())]),
                     None => {
                         let color = self.color_if_spectrum(texture, ColorRole::Reflectance);
@@ -324,7 +324,7 @@ impl<'a> SceneReader<'a> {
         &mut self,
         number: NumberSource,
         context: BsdfContext,
-        convert_texture: impl FnOnce(&mut Self, ObjectIndex, UvConvention) -> Option<BuiltValue>,
+        convert_texture: impl FnOnce(&mut Self, NodeIndex, UvFlips) -> Option<BuiltValue>,
     ) -> BuiltValue {
         match number {
             NumberSource::Constant(number) => shorten_number(number.clamp(0.0, 1.0)).into(),

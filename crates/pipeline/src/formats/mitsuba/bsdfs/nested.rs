@@ -2,13 +2,13 @@
 
 use super::{BsdfContext, MaterialBuilder};
 use crate::formats::foreign::import::TableEntries;
-use crate::formats::mitsuba::graph::{Child, ObjectIndex, ObjectKind, PluginInstance};
+use crate::formats::mitsuba::graph::{Child, NodeIndex, ObjectKind, PluginInstance};
 use crate::formats::mitsuba::material_key::BlendPartKey;
 use crate::formats::mitsuba::property::PropertyValue;
 use crate::formats::mitsuba::reader::{ColorRole, ColorSource, NumberSource, SceneReader};
 use crate::formats::mitsuba::textures::MitsubaTextureUse;
-use crate::formats::mitsuba::xml::shorten;
-use crate::formats::rounding::{shorten as shorten_number, shorten_color};
+use crate::formats::mitsuba::xml::truncate_for_message;
+use crate::formats::rounding::{shorten_color, shorten_number};
 use crate::math::DVec3;
 use crate::scene::BuiltValue;
 
@@ -17,7 +17,7 @@ impl<'a> SceneReader<'a> {
     pub(super) fn nested_bsdf(&mut self, object: &'a PluginInstance) -> Option<&'a Child> {
         let nested = self.children_of_kind(object, ObjectKind::Bsdf).next();
         if nested.is_none() {
-            let message = format!("`{}` needs a nested BSDF", shorten(&object.plugin));
+            let message = format!("`{}` needs a nested BSDF", truncate_for_message(&object.plugin));
             self.report_error(object.span.clone(), message, None);
         }
         nested
@@ -40,7 +40,7 @@ impl<'a> SceneReader<'a> {
         Some(MaterialBuilder { is_one_sided: false, ..built })
     }
 
-    pub(super) fn mask(&mut self, index: ObjectIndex, context: BsdfContext) -> Option<MaterialBuilder> {
+    pub(super) fn mask(&mut self, index: NodeIndex, context: BsdfContext) -> Option<MaterialBuilder> {
         let object = self.object_by_index(index);
         let nested = self.nested_bsdf(object)?;
         let opacity = self.fraction(object, "opacity", 0.5);
@@ -148,7 +148,7 @@ impl<'a> SceneReader<'a> {
         Some(self.add_material(built, wanted, inner.span.clone()))
     }
 
-    pub(super) fn coating(&mut self, index: ObjectIndex, context: BsdfContext) -> Option<MaterialBuilder> {
+    pub(super) fn coating(&mut self, index: NodeIndex, context: BsdfContext) -> Option<MaterialBuilder> {
         let object = self.object_by_index(index);
         let nested = self.nested_bsdf(object)?;
         if context.coat.is_some() {
@@ -194,7 +194,7 @@ impl<'a> SceneReader<'a> {
         let roughness = match object.plugin.as_str() {
             "roughcoating" => {
                 let mut keys = TableEntries::new();
-                self.add_distribution(&mut keys, object, 0.1, context, false);
+                self.add_microfacet_keys(&mut keys, object, 0.1, context, false);
                 keys.into_iter().find(|(key, _)| *key == "roughness").map_or(0.3.into(), |(_, value)| value)
             }
             _ => 0.0.into(),
@@ -202,7 +202,7 @@ impl<'a> SceneReader<'a> {
         built.keys.push(("coat", 1.0.into()));
         built.keys.push(("coat_roughness", roughness));
         built.keys.push(("coat_ior", shorten_number(ior).into()));
-        match self.color(object, "sigma_a", ColorRole::Unbounded, 0.0) {
+        match self.color_or_texture(object, "sigma_a", ColorRole::Unbounded, 0.0) {
             ColorSource::Constant(sigma) if sigma != DVec3::ZERO => {
                 // Light passes through the layer twice.
                 let tint = sigma.to_array().map(|sigma| libm::exp(-2.0 * thickness * sigma).clamp(0.0, 1.0));
@@ -220,10 +220,10 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Returns the nested texture of a bump or normal map.
-    pub(super) fn nested_texture(&mut self, object: &'a PluginInstance) -> Option<ObjectIndex> {
+    pub(super) fn nested_texture(&mut self, object: &'a PluginInstance) -> Option<NodeIndex> {
         let texture = self.children_of_kind(object, ObjectKind::Texture).next();
         if texture.is_none() {
-            let message = format!("`{}` needs a nested texture", shorten(&object.plugin));
+            let message = format!("`{}` needs a nested texture", truncate_for_message(&object.plugin));
             self.report_error(object.span.clone(), message, None);
         }
         texture.map(|child| child.target)

@@ -10,8 +10,8 @@ use crate::formats::mitsuba::plastic::{PlasticCoat, remapped_reflectance};
 use crate::formats::mitsuba::property::PropertyValue;
 use crate::formats::mitsuba::reader::{ColorRole, ColorSource, NumberSource, SceneReader, luminance};
 use crate::formats::mitsuba::settings::span_of;
-use crate::formats::mitsuba::xml::shorten;
-use crate::formats::rounding::{shorten as shorten_number, shorten_color, shorten_vector};
+use crate::formats::mitsuba::xml::truncate_for_message;
+use crate::formats::rounding::{shorten_color, shorten_number, shorten_vector};
 use crate::materials::conductor::elements::NamedConductor;
 use crate::math::DVec3;
 use crate::scene::BuiltValue;
@@ -20,9 +20,9 @@ use crate::scene::nearest::nearest_name;
 impl<'a> SceneReader<'a> {
     /// Reports a color scale that glimt lacks, unless it is 1.
     pub(super) fn ignored_scale(&mut self, object: &'a PluginInstance, name: &str) {
-        let scale = self.color(object, name, ColorRole::Reflectance, 1.0);
+        let scale = self.color_or_texture(object, name, ColorRole::Reflectance, 1.0);
         if scale != ColorSource::Constant(DVec3::ONE) {
-            let subject = format!("`{name}` of `{}`", shorten(&object.plugin));
+            let subject = format!("`{name}` of `{}`", truncate_for_message(&object.plugin));
             self.notes.substitute_changing_lighting(&subject, "replaced by 1", span_of(object, name));
         }
     }
@@ -47,7 +47,7 @@ impl<'a> SceneReader<'a> {
             };
             self.report_error(
                 property.span.clone(),
-                format!("unknown substance `{}`", shorten(substance)),
+                format!("unknown substance `{}`", truncate_for_message(substance)),
                 Some(help),
             );
             default
@@ -70,7 +70,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Adds the keys of a microfacet distribution: `roughness`, `anisotropy` and `distribution`.
-    pub(super) fn add_distribution(
+    pub(super) fn add_microfacet_keys(
         &mut self,
         keys: &mut TableEntries,
         object: &'a PluginInstance,
@@ -121,7 +121,11 @@ impl<'a> SceneReader<'a> {
             }
             Some((other, span)) => {
                 let help = "expected beckmann or ggx".to_owned();
-                self.report_error(span, format!("unknown distribution `{}`", shorten(other)), Some(help));
+                self.report_error(
+                    span,
+                    format!("unknown distribution `{}`", truncate_for_message(other)),
+                    Some(help),
+                );
             }
         }
     }
@@ -162,7 +166,7 @@ impl<'a> SceneReader<'a> {
             None => !object.is_old,
         };
         if !has_eta && reflects_all {
-            let color = self.color(object, "specular_reflectance", ColorRole::Reflectance, 1.0);
+            let color = self.color_or_texture(object, "specular_reflectance", ColorRole::Reflectance, 1.0);
             let color = self.color_value(color, context, 1.0);
             if !is_rough {
                 return Some(MaterialBuilder::one_sided("mirror", vec![("reflectance", color)]));
@@ -171,13 +175,13 @@ impl<'a> SceneReader<'a> {
             if let Some(blend) = self.checkered_metal(&keys, object, context) {
                 return Some(blend);
             }
-            self.add_distribution(&mut keys, object, 0.1, context, true);
+            self.add_microfacet_keys(&mut keys, object, 0.1, context, true);
             return Some(MaterialBuilder::one_sided("metal", keys));
         }
         let mut keys = TableEntries::new();
         if has_eta {
-            let eta = self.color(object, "eta", ColorRole::Unbounded, 0.0);
-            let k = self.color(object, "k", ColorRole::Unbounded, 1.0);
+            let eta = self.color_or_texture(object, "eta", ColorRole::Unbounded, 0.0);
+            let k = self.color_or_texture(object, "k", ColorRole::Unbounded, 1.0);
             keys.push(("eta", self.color_value(eta, context, 1.0)));
             keys.push(("k", self.color_value(k, context, 1.0)));
         } else {
@@ -187,7 +191,7 @@ impl<'a> SceneReader<'a> {
             let Some(conductor) = known else {
                 let near = nearest_name(name, NamedConductor::ALL.iter().map(|one| one.name()));
                 let help = near.map(|near| format!("did you mean `{near}`?"));
-                self.report_error(span, format!("unknown conductor `{}`", shorten(name)), help);
+                self.report_error(span, format!("unknown conductor `{}`", truncate_for_message(name)), help);
                 return None;
             };
             // Mitsuba integrates η and k like emission spectra.
@@ -205,7 +209,7 @@ impl<'a> SceneReader<'a> {
                 span_of(object, "ext_eta"),
             );
         }
-        let scale = self.color(object, "specular_reflectance", ColorRole::Reflectance, 1.0);
+        let scale = self.color_or_texture(object, "specular_reflectance", ColorRole::Reflectance, 1.0);
         if is_rough
             && scale == ColorSource::Constant(DVec3::ONE)
             && let Some(blend) = self.checkered_metal(&keys, object, context)
@@ -213,7 +217,7 @@ impl<'a> SceneReader<'a> {
             return Some(blend);
         }
         if is_rough {
-            self.add_distribution(&mut keys, object, 0.1, context, true);
+            self.add_microfacet_keys(&mut keys, object, 0.1, context, true);
         } else {
             keys.push(("roughness", 0.0.into()));
         }
@@ -287,7 +291,8 @@ impl<'a> SceneReader<'a> {
         match object.plugin.as_str() {
             "thindielectric" => {
                 keys.push(("thin", true.into()));
-                let tint = self.color(object, "specular_transmittance", ColorRole::Reflectance, 1.0);
+                let tint =
+                    self.color_or_texture(object, "specular_transmittance", ColorRole::Reflectance, 1.0);
                 if tint != ColorSource::Constant(DVec3::ONE) {
                     let value = self.color_value(tint, context, 1.0);
                     keys.push(("tint", value));
@@ -295,7 +300,7 @@ impl<'a> SceneReader<'a> {
             }
             "roughdielectric" => {
                 self.ignored_scale(object, "specular_transmittance");
-                self.add_distribution(&mut keys, object, 0.1, context, false);
+                self.add_microfacet_keys(&mut keys, object, 0.1, context, false);
             }
             _ => self.ignored_scale(object, "specular_transmittance"),
         }
@@ -314,7 +319,7 @@ impl<'a> SceneReader<'a> {
             if let NumberSource::Constant(constant) = self.number_or_texture(object, "alpha", 0.1) {
                 alpha = constant.clamp(1e-4, 1.0);
             }
-            self.add_distribution(&mut distribution, object, 0.1, context, false);
+            self.add_microfacet_keys(&mut distribution, object, 0.1, context, false);
             keys.extend(distribution);
             Some(alpha)
         } else {
@@ -323,7 +328,7 @@ impl<'a> SceneReader<'a> {
         };
         let is_beckmann = keys.iter().any(|(key, _)| *key == "distribution");
         let coat = self.cached_plastic_coat(ior, alpha, is_beckmann);
-        match self.color(object, "diffuse_reflectance", ColorRole::Reflectance, 0.5) {
+        match self.color_or_texture(object, "diffuse_reflectance", ColorRole::Reflectance, 0.5) {
             ColorSource::Constant(color) => {
                 let remapped =
                     color.to_array().map(|kd| remapped_reflectance(kd.min(1.0), &coat, is_nonlinear));
@@ -339,7 +344,7 @@ impl<'a> SceneReader<'a> {
                 }
             }
         }
-        let scale = self.color(object, "specular_reflectance", ColorRole::Reflectance, 1.0);
+        let scale = self.color_or_texture(object, "specular_reflectance", ColorRole::Reflectance, 1.0);
         if scale != ColorSource::Constant(DVec3::ONE) {
             let value = self.color_value(scale, context, 1.0);
             keys.push(("specular", value));

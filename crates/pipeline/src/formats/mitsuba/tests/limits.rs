@@ -75,7 +75,7 @@ fn canceled_readers_add_nothing() {
         let canceled = CancelToken::new();
         canceled.cancel();
         let mut loader = XmlLoader::new(path, &[], context.token);
-        let root = loader.load_scene(path).expect("readable").expect("valid");
+        let root = loader.load_scene_elements(path).expect("readable").expect("valid");
         let files = &loader.reader.files;
         let partial = GraphBuilder::new(files, &canceled).build(&root).expect("no errors");
         assert_eq!(partial.objects.len(), 1);

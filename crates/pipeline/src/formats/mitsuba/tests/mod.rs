@@ -11,14 +11,14 @@ mod unused;
 
 use std::path::{Path, PathBuf};
 
-use super::{convert, read};
+use super::{import_with_assets, read};
 use crate::control::CancelToken;
 use crate::formats::foreign::{ForeignError, ForeignOptions};
 use crate::formats::model::ModelViewOptions;
 use crate::formats::{ForeignReadContext, ForeignScene, ImportedScene, scene_from_document};
 use crate::scene::LoadedScene;
 use crate::scene::diagnostic::Diagnostic;
-use crate::stages::containers::GltfContainers;
+use crate::stages::containers::OpenAssetFiles;
 
 /// A minimal sensor. Every scene needs one.
 const SENSOR: &str = r#"<sensor type="perspective"/>"#;
@@ -46,7 +46,7 @@ impl Bench {
     }
 
     fn with_context<T>(&self, use_: impl FnOnce(&Path, &ForeignReadContext<'_>) -> T) -> T {
-        let (containers, token) = (GltfContainers::default(), CancelToken::new());
+        let (containers, token) = (OpenAssetFiles::default(), CancelToken::new());
         let context = ForeignReadContext {
             view: ModelViewOptions::default(),
             options: &self.options,
@@ -61,7 +61,7 @@ impl Bench {
     }
 
     fn import(&self) -> ImportedScene {
-        self.with_context(|path, context| convert(path, "scene_files", context))
+        self.with_context(|path, context| import_with_assets(path, "scene_files", context))
             .map_err(diagnostics)
             .expect("valid")
     }

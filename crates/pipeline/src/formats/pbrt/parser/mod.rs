@@ -11,8 +11,8 @@ use std::sync::Arc;
 use super::lexer::{Lexer, PbrtError, PbrtResult, Token, TokenKind};
 use super::parameters::{Parameters, Text, V3_HELP};
 use super::state::{
-    AttributeTarget, ColorSpace, Entity, GraphicsState, MotionTransform, ObjectDefinition, PlacedEntity,
-    Statements,
+    AttributeTarget, ColorSpace, GraphicsState, MotionTransform, ObjectDefinition, PlacedEntity, Statements,
+    TypedStatement,
 };
 use crate::assets::AssetError;
 use crate::control::CancelToken;
@@ -140,9 +140,9 @@ pub(super) fn parse<'a>(
     Ok(parser)
 }
 
-fn default_material() -> Entity {
+fn default_material() -> TypedStatement {
     let kind = Text { text: "diffuse".to_owned(), span: 0..0 };
-    Entity { kind, parameters: Parameters::default(), color_space: ColorSpace::Srgb }
+    TypedStatement { kind, parameters: Parameters::default(), color_space: ColorSpace::Srgb }
 }
 
 fn canonical_path(path: &Path) -> PathBuf {
@@ -260,16 +260,16 @@ impl Parser<'_> {
                 self.transform_statement(directive, lexer)
             }
             "Camera" | "Film" | "Integrator" | "PixelFilter" | "Sampler" | "Accelerator" => {
-                self.option_entity(directive, lexer)
+                self.entity_before_world(directive, lexer)
             }
             "Option" => {
                 quoted(directive, lexer)?;
-                any(directive, lexer).map(|_| ())
+                expect_token(directive, lexer).map(|_| ())
             }
             "WorldBegin" => self.begin_world(&span),
             "ColorSpace" => self.color_space(directive, lexer),
             "ReverseOrientation" => {
-                self.check_world(&span, "ReverseOrientation")?;
+                self.check_after_world_begin(&span, "ReverseOrientation")?;
                 self.state.is_reversed = !self.state.is_reversed;
                 Ok(())
             }
@@ -284,7 +284,7 @@ impl Parser<'_> {
             "ObjectInstance" => self.instance(directive, lexer),
             "Shape" | "LightSource" | "AreaLightSource" | "Material" | "MakeNamedMaterial"
             | "NamedMaterial" | "Texture" => {
-                self.check_world(&span, &directive.text)?;
+                self.check_after_world_begin(&span, &directive.text)?;
                 self.world_entity(directive, lexer)
             }
             other => Err(unknown_directive(other, span)),
@@ -292,7 +292,7 @@ impl Parser<'_> {
     }
 
     /// Returns an error before `WorldBegin`, for statements that must follow it.
-    fn check_world(&self, span: &Range<usize>, name: &str) -> PbrtResult<()> {
+    fn check_after_world_begin(&self, span: &Range<usize>, name: &str) -> PbrtResult<()> {
         if self.is_world {
             return Ok(());
         }
@@ -305,24 +305,28 @@ impl Parser<'_> {
         directive: &Token<'_>,
         lexer: &mut Lexer<'_>,
         target: AttributeTarget,
-    ) -> PbrtResult<Entity> {
+    ) -> PbrtResult<TypedStatement> {
         let mut entity = self.entity_without_defaults(directive, lexer)?;
         entity.parameters.add_defaults(self.state.default_parameters(target));
         Ok(entity)
     }
 
-    fn entity_without_defaults(&self, directive: &Token<'_>, lexer: &mut Lexer<'_>) -> PbrtResult<Entity> {
+    fn entity_without_defaults(
+        &self,
+        directive: &Token<'_>,
+        lexer: &mut Lexer<'_>,
+    ) -> PbrtResult<TypedStatement> {
         let kind = quoted(directive, lexer)?;
         let span = directive.span.start..kind.span.end;
         let parameters = Parameters::parse(lexer, span)?;
-        Ok(Entity { kind, parameters, color_space: self.state.color_space })
+        Ok(TypedStatement { kind, parameters, color_space: self.state.color_space })
     }
 
-    fn placed(&self, entity: Entity) -> PlacedEntity {
+    fn placed(&self, entity: TypedStatement) -> PlacedEntity {
         PlacedEntity { entity, transform: self.state.transform }
     }
 
-    fn option_entity(&mut self, directive: &Token<'_>, lexer: &mut Lexer<'_>) -> PbrtResult<()> {
+    fn entity_before_world(&mut self, directive: &Token<'_>, lexer: &mut Lexer<'_>) -> PbrtResult<()> {
         let name = &*directive.text;
         if self.is_world {
             let error = PbrtError::new(directive.span.clone(), format!("`{name}` must precede `WorldBegin`"));
@@ -360,7 +364,7 @@ impl Parser<'_> {
     }
 
     fn attribute(&mut self, directive: &Token<'_>, lexer: &mut Lexer<'_>) -> PbrtResult<()> {
-        let Entity { kind, parameters, .. } = self.entity_without_defaults(directive, lexer)?;
+        let TypedStatement { kind, parameters, .. } = self.entity_without_defaults(directive, lexer)?;
         let found = AttributeTarget::NAMES.iter().find(|(name, _)| *name == kind.text);
         let Some((_, target)) = found else {
             let near = nearest_name(&kind.text, AttributeTarget::NAMES.iter().map(|(name, _)| *name));
@@ -385,7 +389,7 @@ impl Parser<'_> {
             BlockKind::Attribute => "AttributeBegin",
             BlockKind::Object => "ObjectBegin",
         };
-        self.check_world(&span, name)?;
+        self.check_after_world_begin(&span, name)?;
         if self.stack.len() >= MAX_ATTRIBUTE_DEPTH {
             let message = format!("blocks are nested more than {MAX_ATTRIBUTE_DEPTH} deep");
             return Err(PbrtError::new(span, message));
@@ -443,7 +447,7 @@ fn skip_to_directive(lexer: &mut Lexer<'_>) -> bool {
 }
 
 /// Reads the next token of a statement. Returns an error at the end of the file.
-fn any<'a>(directive: &Token<'_>, lexer: &mut Lexer<'a>) -> PbrtResult<Token<'a>> {
+fn expect_token<'a>(directive: &Token<'_>, lexer: &mut Lexer<'a>) -> PbrtResult<Token<'a>> {
     let missing = || {
         let message =
             format!("the file ends in the middle of `{}`", escape_and_truncate(&directive.text, 32));
@@ -454,7 +458,7 @@ fn any<'a>(directive: &Token<'_>, lexer: &mut Lexer<'a>) -> PbrtResult<Token<'a>
 
 /// Reads a quoted string.
 fn quoted(directive: &Token<'_>, lexer: &mut Lexer<'_>) -> PbrtResult<Text> {
-    let token = any(directive, lexer)?;
+    let token = expect_token(directive, lexer)?;
     if token.kind != TokenKind::Quoted {
         let name = escape_and_truncate(&directive.text, 32);
         let error = PbrtError::new(token.span, format!("`{name}` needs a string in double quotes"));

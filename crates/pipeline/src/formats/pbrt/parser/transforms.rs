@@ -3,7 +3,7 @@
 use super::super::lexer::{Lexer, PbrtError, PbrtResult, Token, TokenKind};
 use super::super::state::{look_at, rotation};
 use super::super::values::parse_number;
-use super::{Parser, any, quoted};
+use super::{Parser, expect_token, quoted};
 use crate::math::{DMat4, DVec3};
 use crate::scene::nearest::nearest_name;
 
@@ -33,11 +33,11 @@ impl Parser<'_> {
                 self.state.concat(matrix);
             }
             "Transform" => {
-                let matrix = bracketed_matrix(directive, lexer)?;
+                let matrix = column_major_matrix(directive, lexer)?;
                 self.state.map_active_transforms(|_| matrix);
             }
             "ConcatTransform" => {
-                let matrix = bracketed_matrix(directive, lexer)?;
+                let matrix = column_major_matrix(directive, lexer)?;
                 self.state.concat(matrix);
             }
             "TransformTimes" => {
@@ -63,7 +63,7 @@ impl Parser<'_> {
 }
 
 fn active_transforms(directive: &Token<'_>, lexer: &mut Lexer<'_>) -> PbrtResult<[bool; 2]> {
-    let which = any(directive, lexer)?;
+    let which = expect_token(directive, lexer)?;
     match &*which.text {
         "All" => Ok([true; 2]),
         "StartTime" => Ok([true, false]),
@@ -80,10 +80,10 @@ fn numbers<const N: usize>(directive: &Token<'_>, lexer: &mut Lexer<'_>) -> Pbrt
     }
     let mut values = [0.0; N];
     for value in &mut values {
-        *value = parse_number(&any(directive, lexer)?)?;
+        *value = parse_number(&expect_token(directive, lexer)?)?;
     }
     if has_brackets {
-        let close = any(directive, lexer)?;
+        let close = expect_token(directive, lexer)?;
         if close.kind != TokenKind::CloseBracket {
             return Err(PbrtError::new(close.span, format!("expected ] after {N} numbers")));
         }
@@ -92,6 +92,6 @@ fn numbers<const N: usize>(directive: &Token<'_>, lexer: &mut Lexer<'_>) -> Pbrt
 }
 
 /// Reads a matrix: 16 numbers, column by column.
-fn bracketed_matrix(directive: &Token<'_>, lexer: &mut Lexer<'_>) -> PbrtResult<DMat4> {
+fn column_major_matrix(directive: &Token<'_>, lexer: &mut Lexer<'_>) -> PbrtResult<DMat4> {
     Ok(DMat4::from_cols_array(&numbers(directive, lexer)?))
 }

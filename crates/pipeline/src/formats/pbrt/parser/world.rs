@@ -6,7 +6,8 @@ use std::rc::Rc;
 use super::super::lexer::{Lexer, PbrtError, PbrtResult, Token, TokenKind};
 use super::super::parameters::{Text, V3_HELP};
 use super::super::state::{
-    AttributeTarget, Entity, GraphicsState, MaterialReference, ObjectDefinition, ObjectInstance, ShapeEntity,
+    AttributeTarget, GraphicsState, MaterialReference, ObjectDefinition, ObjectInstance, ShapeEntity,
+    TypedStatement,
 };
 use super::{BlockKind, Parser, quoted};
 
@@ -86,7 +87,7 @@ impl Parser<'_> {
         Err(error.with_help("merge shapes into larger meshes"))
     }
 
-    pub(super) fn add_shape(&mut self, entity: Entity) {
+    pub(super) fn add_shape(&mut self, entity: TypedStatement) {
         let GraphicsState { is_reversed, material, material_span, area_light, media, .. } =
             self.state.clone();
         let placed = self.placed(entity);
@@ -131,7 +132,7 @@ impl Parser<'_> {
 
     pub(super) fn instance(&mut self, directive: &Token<'_>, lexer: &mut Lexer<'_>) -> PbrtResult<()> {
         let name = quoted(directive, lexer)?;
-        self.check_world(&directive.span, "ObjectInstance")?;
+        self.check_after_world_begin(&directive.span, "ObjectInstance")?;
         if self.object.is_some() {
             return Err(PbrtError::new(directive.span.clone(), "objects cannot contain instances"));
         }

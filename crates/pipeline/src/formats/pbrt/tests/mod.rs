@@ -15,7 +15,7 @@ use crate::formats::model::ModelViewOptions;
 use crate::formats::{ForeignReadContext, ForeignScene, scene_from_document};
 use crate::scene::LoadedScene;
 use crate::scene::diagnostic::Diagnostic;
-use crate::stages::containers::GltfContainers;
+use crate::stages::containers::OpenAssetFiles;
 
 /// A folder with a scene and its files.
 pub(super) struct SceneFolder {
@@ -51,7 +51,7 @@ impl SceneFolder {
 }
 
 pub(super) fn read_path(path: &Path, options: &ForeignOptions) -> Result<ForeignScene, Vec<Diagnostic>> {
-    let (containers, token) = (GltfContainers::default(), CancelToken::new());
+    let (containers, token) = (OpenAssetFiles::default(), CancelToken::new());
     let view = ModelViewOptions::default();
     let context = ForeignReadContext { view, options, containers: &containers, token: &token };
     read_glimt_scene(path, &context).map_err(|error| match error {
@@ -77,8 +77,8 @@ pub(super) const CAMERA: &str = "LookAt 0 0 -5  0 0 0  0 1 0\nCamera \"perspecti
 
 /// The generated meshes of a scene.
 pub(super) fn generated_meshes(scene: &ForeignScene) -> Vec<crate::assets::LoadedMesh> {
-    let files = scene.document.generated_files().iter();
-    let load = |(name, file): (&String, &crate::scene::GeneratedFile)| {
+    let files = scene.document.in_memory_files().iter();
+    let load = |(name, file): (&String, &crate::scene::InMemoryFile)| {
         load_from_bytes(Path::new(name), &file.bytes, &ignore_progress, &CancelToken::new()).expect("a mesh")
     };
     files.filter(|(name, _)| name.ends_with(".ply")).map(load).collect()

@@ -13,7 +13,8 @@ use crate::integrators::transport::ray::PathRay;
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::transport::vertex::{ShadingVertex, SpecularLobe, SurfaceVertex};
 use crate::integrators::transport::walk::{
-    Interaction, Interface, NullInteractionOutcome, OpaqueSurfaceHit, PathStepper, opacity_at_path_vertex,
+    MediumInterface, NullInteractionOutcome, OpaqueSurfaceHit, PathStepper, ReachedInteraction,
+    opacity_at_path_vertex,
 };
 use crate::integrators::view::PathAov;
 use crate::materials::{Bsdf, BxdfPoint, Material, NonSpecular, SpecularOverBase, ThinDielectric};
@@ -36,21 +37,21 @@ impl<'a> PathStepper<'a> for PhotonWavefront<'a> {
     fn record_surface_crossing(&mut self, _: &PathRay, _: Option<Hit>) {}
 
     #[inline(always)]
-    fn handle_interaction(&mut self, path: &PathRay, reached: Interaction<'_, 'a>, has_passed: bool) {
+    fn handle_interaction(&mut self, path: &PathRay, reached: ReachedInteraction<'_, 'a>, has_passed: bool) {
         match reached {
-            Interaction::Opaque(vertex, _, far) => {
+            ReachedInteraction::Opaque(vertex, _, far) => {
                 let lacks_photons = self.depth == 0 && !has_passed;
                 self.shade_surface(path, vertex, (far, lacks_photons));
             }
-            Interaction::Glass(vertex, _, Interface { far, rough: None }) => {
+            ReachedInteraction::Glass(vertex, _, MediumInterface { far, rough: None }) => {
                 self.shade_glass_hit(path, vertex, far);
             }
             // Direct light is found by light samples.
-            Interaction::Glass(..) if self.depth == 0 && !has_passed => {}
-            Interaction::Glass(vertex, _, Interface { far, rough: Some(rough) }) => {
+            ReachedInteraction::Glass(..) if self.depth == 0 && !has_passed => {}
+            ReachedInteraction::Glass(vertex, _, MediumInterface { far, rough: Some(rough) }) => {
                 self.store_and_scatter(path, vertex, rough.reflection_bxdf(), (far, Some(1.0)));
             }
-            Interaction::Nothing | Interaction::Hidden => {}
+            ReachedInteraction::Nothing | ReachedInteraction::Hidden => {}
         }
     }
 

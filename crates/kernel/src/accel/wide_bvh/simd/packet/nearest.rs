@@ -40,14 +40,15 @@ impl<V: SimdVector> NearestHits<V> {
             return 0;
         }
         let others = !packet.lanes_starting_on(pack.ids[lane]);
-        let hits = triangle::Hits { hit: hits.hit & others, doubtful: hits.doubtful & others, ..hits };
+        let hits =
+            triangle::TriangleHits { hit: hits.hit & others, doubtful: hits.doubtful & others, ..hits };
         self.record_nearer_hits(&hits, pack, lane, rays)
     }
 
     #[inline(always)]
     fn record_nearer_hits(
         &mut self,
-        hits: &triangle::Hits<V>,
+        hits: &triangle::TriangleHits<V>,
         pack: &TrianglePack,
         lane: usize,
         rays: &[Ray],

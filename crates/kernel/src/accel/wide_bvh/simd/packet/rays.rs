@@ -113,7 +113,12 @@ impl<V: SimdVector> SimdRayPacket<V> {
 
     /// Tests the triangle in a lane of a pack against all rays, including rays that start on it.
     #[inline(always)]
-    pub fn intersect_triangle(&self, pack: &TrianglePack, lane: usize, t_max: V) -> triangle::Hits<V> {
+    pub fn intersect_triangle(
+        &self,
+        pack: &TrianglePack,
+        lane: usize,
+        t_max: V,
+    ) -> triangle::TriangleHits<V> {
         let (a, b, c) = (
             self.sheared_corner(pack, 0, lane),
             self.sheared_corner(pack, 3, lane),

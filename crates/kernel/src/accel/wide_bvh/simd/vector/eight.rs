@@ -94,7 +94,7 @@ impl SimdVector for SimdF32x8 {
     }
 
     #[inline(always)]
-    fn and_not(mask: Mask8, but: Mask8) -> Mask8 {
+    fn mask_difference(mask: Mask8, but: Mask8) -> Mask8 {
         // SAFETY: as above.
         Mask8(unsafe { _mm256_andnot_ps(but.0, mask.0) })
     }

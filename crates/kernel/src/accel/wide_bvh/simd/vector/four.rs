@@ -94,7 +94,7 @@ impl SimdVector for SimdF32x4 {
     }
 
     #[inline(always)]
-    fn and_not(mask: Mask4, but: Mask4) -> Mask4 {
+    fn mask_difference(mask: Mask4, but: Mask4) -> Mask4 {
         // SAFETY: as above.
         Mask4(unsafe { _mm_andnot_ps(but.0, mask.0) })
     }

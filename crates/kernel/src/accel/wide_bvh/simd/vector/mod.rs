@@ -73,7 +73,7 @@ pub trait SimdVector: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Outpu
     /// Bitwise selection: `self` where the mask is set, `other` elsewhere.
     fn select(self, mask: Self::Mask, other: Self) -> Self;
     /// Lanes set in `mask` but not in `but`.
-    fn and_not(mask: Self::Mask, but: Self::Mask) -> Self::Mask;
+    fn mask_difference(mask: Self::Mask, but: Self::Mask) -> Self::Mask;
     /// Converts a mask to bits, one per lane.
     fn movemask(mask: Self::Mask) -> u32;
     /// Converts bits to a mask. `like` proves that the processor has the instructions.

@@ -117,8 +117,8 @@ impl<V: SimdVector> SimdVector for VectorPair<V> {
     }
 
     #[inline(always)]
-    fn and_not(mask: Self::Mask, but: Self::Mask) -> Self::Mask {
-        VectorPair(V::and_not(mask.0, but.0), V::and_not(mask.1, but.1))
+    fn mask_difference(mask: Self::Mask, but: Self::Mask) -> Self::Mask {
+        VectorPair(V::mask_difference(mask.0, but.0), V::mask_difference(mask.1, but.1))
     }
 
     #[inline(always)]

@@ -112,7 +112,7 @@ impl SimdVector for SimdF32x16 {
     }
 
     #[inline(always)]
-    fn and_not(mask: Mask16, but: Mask16) -> Mask16 {
+    fn mask_difference(mask: Mask16, but: Mask16) -> Mask16 {
         Mask16(mask.0 & !but.0)
     }
 
