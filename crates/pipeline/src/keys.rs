@@ -145,7 +145,7 @@ fn light_descriptions_key(scene: &Scene, of: &FingerprintContext<'_>) -> Fingerp
                 key.add_with_references(&material.emitter_coat().cloned(), of)
                     .add_with_references(&object.placement.as_deref().copied(), of);
                 // Blends emit through their parts, so add the whole material.
-                if !material.kind.blend_parts().is_empty() {
+                if !material.kind.blended_materials().is_empty() {
                     key.add_with_references(material, of);
                 }
             }

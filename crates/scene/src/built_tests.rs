@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::description::Scene;
 use super::diagnostic::Diagnostic;
-use super::{BuiltValue, LoadedScene, SceneDocumentBuilder, load_built, parse};
+use super::{LoadedScene, SceneDocumentBuilder, SceneDocumentValue, load_built, parse};
 use crate::math::DVec3;
 
 /// Text of a foreign file. The last number is the radius of the second sphere.
@@ -30,7 +30,7 @@ fn built(radius: f64, source: &str) -> SceneDocumentBuilder {
     built.start_list_table("box");
     built.set("material", "big brick");
     built.start_list_table("sphere");
-    built.set("center", BuiltValue::Array(vec![4.0.into(), 5.0.into(), 6e-7.into()]));
+    built.set("center", SceneDocumentValue::Array(vec![4.0.into(), 5.0.into(), 6e-7.into()]));
     if !source.is_empty() {
         built.set_span_for_next_values(SOURCE.len() - 2..SOURCE.len());
     }

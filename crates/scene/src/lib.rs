@@ -33,7 +33,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-pub use self::toml::{BuiltValue, InMemoryFile, SceneDocumentBuilder, quote_toml_string};
+pub use self::toml::{InMemoryFile, SceneDocumentBuilder, SceneDocumentValue, quote_toml_string};
 pub use changes::{MAX_COMPARED_BYTES, list_changes};
 use description::{Camera, ResolvedCamera, Scene};
 use diagnostic::{Diagnostic, Severity};

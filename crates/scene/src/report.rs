@@ -16,7 +16,7 @@ use annotate_snippets::{AnnotationKind, Group, Level, Origin, Renderer, Snippet}
 use super::diagnostic::{Diagnostic, Severity};
 use super::sanitize::escape_invisible_chars;
 
-pub use lines::{ReportLine, ReportTextRole, StyledSpan, report_lines};
+pub use lines::{ReportLine, ReportTextRole, StyledSpan, render_diagnostics_as_lines};
 
 /// Report style.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -281,7 +281,7 @@ fn warnings_never_hide_errors() {
 
 mod properties {
     use super::super::diagnostic::Diagnostic;
-    use super::super::report::{ReportStyle, render_diagnostics, report_lines};
+    use super::super::report::{ReportStyle, render_diagnostics, render_diagnostics_as_lines};
     use super::*;
     use proptest::prelude::*;
 
@@ -292,7 +292,7 @@ mod properties {
         }
         let text = render_diagnostics(diagnostics, 60, ReportStyle::Plain);
         assert!(text.chars().all(|c| c == '\n' || !c.is_control()), "{text:?}");
-        let pieces = report_lines(diagnostics, 60);
+        let pieces = render_diagnostics_as_lines(diagnostics, 60);
         assert_eq!(pieces.len(), text.lines().count());
         assert!(pieces.iter().flatten().all(|piece| !piece.text.contains(char::is_control)));
     }

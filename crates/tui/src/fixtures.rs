@@ -13,7 +13,7 @@ use super::options::ContentChangeTime;
 use super::preview_style::PreviewStyle;
 use super::state::{InitialState, State};
 use super::terminal_replies::TerminalQueries;
-use super::terminals::DesktopIntegration;
+use super::terminals::TerminalExtras;
 use super::update::{request_first_render, update};
 use super::view;
 use crate::film::Srgb8Image;
@@ -52,7 +52,7 @@ pub(super) fn state_with(
         is_light: false,
         ansi: XTERM,
         ask: TerminalQueries::default(),
-        capabilities: DesktopIntegration::default(),
+        capabilities: TerminalExtras::default(),
         notify_after: Some(Duration::from_secs(30)),
     };
     State::new(setup, Instant::now())

@@ -44,7 +44,7 @@ pub(super) enum NotificationProtocol {
 
 /// Terminal capabilities beyond text.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct DesktopIntegration {
+pub(super) struct TerminalExtras {
     /// Window titles (OSC 2).
     pub(super) title: bool,
     /// A progress bar in the window frame or taskbar (OSC 9;4).
@@ -174,9 +174,9 @@ impl TerminalId {
     }
 
     /// Capabilities according to the terminal's documentation.
-    pub(super) fn desktop_integration(self) -> DesktopIntegration {
+    pub(super) fn desktop_integration(self) -> TerminalExtras {
         let Self { brand, version } = self;
-        let all = DesktopIntegration {
+        let all = TerminalExtras {
             title: true,
             progress: false,
             notice: Some(NotificationProtocol::Bell),
@@ -186,46 +186,40 @@ impl TerminalId {
         };
         let since = |least: [u32; 2]| version >= least;
         match brand {
-            TerminalBrand::Kitty => DesktopIntegration { notice: Some(NotificationProtocol::Osc99), ..all },
+            TerminalBrand::Kitty => TerminalExtras { notice: Some(NotificationProtocol::Osc99), ..all },
             TerminalBrand::Foot | TerminalBrand::Contour => {
-                DesktopIntegration { notice: Some(NotificationProtocol::Osc777), ..all }
+                TerminalExtras { notice: Some(NotificationProtocol::Osc777), ..all }
             }
-            TerminalBrand::Ghostty => DesktopIntegration {
-                notice: Some(NotificationProtocol::Osc777),
-                progress: since([1, 2]),
-                ..all
-            },
+            TerminalBrand::Ghostty => {
+                TerminalExtras { notice: Some(NotificationProtocol::Osc777), progress: since([1, 2]), ..all }
+            }
             // Older versions display the progress sequence as a notification.
-            TerminalBrand::WezTerm => DesktopIntegration {
+            TerminalBrand::WezTerm => TerminalExtras {
                 notice: Some(NotificationProtocol::Osc777),
                 progress: since([20_250_301, 0]),
                 ..all
             },
-            TerminalBrand::Iterm2 => DesktopIntegration {
-                notice: Some(NotificationProtocol::Osc9),
-                progress: since([3, 7]),
-                ..all
-            },
-            TerminalBrand::WindowsTerminal => DesktopIntegration { progress: true, ..all },
-            TerminalBrand::VsCode => DesktopIntegration { progress: since([1, 97]), ..all },
-            TerminalBrand::Mintty => DesktopIntegration { progress: since([3, 5]), ..all },
-            TerminalBrand::Alacritty => all,
-            TerminalBrand::Konsole => {
-                DesktopIntegration { progress: since([25, 4]), clipboard: false, ..all }
+            TerminalBrand::Iterm2 => {
+                TerminalExtras { notice: Some(NotificationProtocol::Osc9), progress: since([3, 7]), ..all }
             }
-            TerminalBrand::Vte => DesktopIntegration {
+            TerminalBrand::WindowsTerminal => TerminalExtras { progress: true, ..all },
+            TerminalBrand::VsCode => TerminalExtras { progress: since([1, 97]), ..all },
+            TerminalBrand::Mintty => TerminalExtras { progress: since([3, 5]), ..all },
+            TerminalBrand::Alacritty => all,
+            TerminalBrand::Konsole => TerminalExtras { progress: since([25, 4]), clipboard: false, ..all },
+            TerminalBrand::Vte => TerminalExtras {
                 progress: since([8000, 0]),
                 links: since([5000, 0]),
                 clipboard: false,
                 ..all
             },
             // xterm denies clipboard access by default.
-            TerminalBrand::Xterm => DesktopIntegration { links: false, clipboard: false, ..all },
+            TerminalBrand::Xterm => TerminalExtras { links: false, clipboard: false, ..all },
             TerminalBrand::ConEmu => {
-                DesktopIntegration { title: true, progress: true, ..DesktopIntegration::default() }
+                TerminalExtras { title: true, progress: true, ..TerminalExtras::default() }
             }
             TerminalBrand::AppleTerminal => {
-                DesktopIntegration { links: false, clipboard: false, focus: false, notice: None, ..all }
+                TerminalExtras { links: false, clipboard: false, focus: false, notice: None, ..all }
             }
         }
     }

@@ -134,7 +134,7 @@ mod tests {
     use super::*;
     use crate::fixtures::{TestUi, render_progress};
     use crate::pipeline::protocol::Event;
-    use crate::terminals::{DesktopIntegration, TerminalBrand, TerminalId};
+    use crate::terminals::{TerminalBrand, TerminalExtras, TerminalId};
 
     fn ui() -> TestUi {
         let mut ui = TestUi::new();
@@ -178,7 +178,7 @@ mod tests {
     #[test]
     fn unsupported_terminals_get_no_title() {
         let (mut ui, mut shown_title) = (TestUi::new(), TitleAndProgress::default());
-        assert_eq!(ui.state.display.capabilities, DesktopIntegration::default());
+        assert_eq!(ui.state.display.capabilities, TerminalExtras::default());
         ui.finish_render([200, 30, 30]);
         assert_eq!(sent(&mut shown_title, &ui, false), "");
     }

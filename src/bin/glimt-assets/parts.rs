@@ -1,7 +1,7 @@
 //! Building blocks for furniture: boxes, solids of revolution, tubes and balls. All are closed and face
 //! outward.
 
-use super::shapes::displaced_icosphere;
+use super::shapes::icosphere_with_radii;
 use super::surface::PolygonMesh;
 use super::vector::{Vector, add, cross, dot, scale, sin_cos_turns, subtract, unit};
 
@@ -143,5 +143,5 @@ pub(crate) fn round_bar_along_path(path: &[Vector], radius: f64, sides: u32) -> 
 
 /// A ball of 20 · 4^`times` triangles.
 pub(crate) fn ball(times: u32, center: Vector, radius: f64) -> PolygonMesh {
-    translate_mesh(displaced_icosphere(times, |_| radius), center)
+    translate_mesh(icosphere_with_radii(times, |_| radius), center)
 }

@@ -8,7 +8,7 @@ use super::vector::{Vector, add, cross, dot, scale, sin_cos_turns, smoothstep, s
 
 /// A coral: a round lump with branching ridges and 81,920 triangles.
 pub(crate) fn coral() -> PolygonMesh {
-    displaced_icosphere(6, |direction| {
+    icosphere_with_radii(6, |direction| {
         let ridge = 1.0 - (2.0 * fractal_noise(scale(direction, 2.6), 3, 0, 7) - 1.0).abs();
         0.72 + 0.34 * smoothstep(0.62, 1.0, ridge) + 0.05 * fractal_noise(scale(direction, 14.0), 2, 0, 21)
     })
@@ -19,7 +19,7 @@ pub(crate) const GLOBE_SUBDIVISIONS: u32 = 8;
 
 /// A mountainous globe with 20 · 4^`times` triangles.
 pub(crate) fn mountainous_globe(times: u32) -> PolygonMesh {
-    displaced_icosphere(times, |direction| {
+    icosphere_with_radii(times, |direction| {
         let height = fractal_noise(scale(direction, 2.0), 8, 0, 3);
         let crater = value_noise(scale(direction, 9.0), 0, 11);
         0.82 + 0.42 * height - 0.05 * smoothstep(0.68, 0.8, crater)
@@ -133,7 +133,7 @@ fn incident_triangles_in_order(corner: u32, triangles: &[[u32; 3]]) -> Vec<u32> 
 
 /// An icosahedron subdivided `times` times. `radius` returns a vertex's distance from the center, given its
 /// direction.
-pub(crate) fn displaced_icosphere(times: u32, radius: impl Fn(Vector) -> f64) -> PolygonMesh {
+pub(crate) fn icosphere_with_radii(times: u32, radius: impl Fn(Vector) -> f64) -> PolygonMesh {
     let (mut corners, mut triangles) = icosahedron();
     for _ in 0..times {
         let mut middles = HashMap::new();

@@ -87,7 +87,7 @@ impl Parallelogram {
 
     /// Coordinates of a hit in terms of the two edges, each in [0, 1].
     #[inline(always)]
-    fn hit_coordinates(&self, ray: &RayF64, hit: &ShapeHit) -> [f64; 2] {
+    fn coordinates_at_hit(&self, ray: &RayF64, hit: &ShapeHit) -> [f64; 2] {
         self.coordinates_of(ray.at(f64::from(hit.t)))
     }
 
@@ -144,7 +144,7 @@ impl Parallelogram {
 impl SurfacePointsInF64 for Parallelogram {
     #[inline(always)]
     fn surface_point_f64(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
-        let [s, t] = self.hit_coordinates(ray, hit);
+        let [s, t] = self.coordinates_at_hit(ray, hit);
         let reach = (self.corner.abs() + self.u.abs() + self.v.abs()).max_element();
         SurfacePointF64 { point: self.corner + self.u * s + self.v * t, normal: self.normal, reach }
     }
@@ -153,7 +153,7 @@ impl SurfacePointsInF64 for Parallelogram {
 impl UvMapped for Parallelogram {
     #[inline(always)]
     fn uv_at_hit(&self, ray: &RayF64, hit: &ShapeHit) -> DVec2 {
-        let [s, t] = self.hit_coordinates(ray, hit);
+        let [s, t] = self.coordinates_at_hit(ray, hit);
         Vec2::new(s as f32, t as f32).as_dvec2()
     }
 }

@@ -65,7 +65,7 @@ impl Plane {
 
     /// Coordinates of a hit along the plane's axes.
     #[inline(always)]
-    fn hit_coordinates(&self, ray: &RayF64, hit: &ShapeHit) -> [f64; 2] {
+    fn coordinates_at_hit(&self, ray: &RayF64, hit: &ShapeHit) -> [f64; 2] {
         self.coordinates_of(ray.at(f64::from(hit.t)))
     }
 
@@ -135,7 +135,7 @@ impl Plane {
 impl SurfacePointsInF64 for Plane {
     #[inline(always)]
     fn surface_point_f64(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
-        let [s, t] = self.hit_coordinates(ray, hit);
+        let [s, t] = self.coordinates_at_hit(ray, hit);
         let reach = self.point.abs().max_element() + s.abs() + t.abs();
         SurfacePointF64 { point: self.point + self.u * s + self.v * t, normal: self.normal, reach }
     }
@@ -144,7 +144,7 @@ impl SurfacePointsInF64 for Plane {
 impl UvMapped for Plane {
     #[inline(always)]
     fn uv_at_hit(&self, ray: &RayF64, hit: &ShapeHit) -> DVec2 {
-        DVec2::from_array(self.hit_coordinates(ray, hit))
+        DVec2::from_array(self.coordinates_at_hit(ray, hit))
     }
 }
 

@@ -46,7 +46,7 @@ pub mod tree;
 
 pub use area::{
     AreaLight, BlendPartWeight, EmissionModulation, EmissionTerm, Emitter, EmittingPart, MeshEmitter, Side,
-    TriangleWithUvs, UvMapping, back_area_light, create_see_through_side_light, front_area_light,
+    TriangleWithUvs, UvMapping, create_see_through_side_light, new_back_area_light, new_front_area_light,
 };
 pub use light::{Light, LightFamily};
 pub use packet::{EmitterObjectPacket, LightSamplePacket};

@@ -47,7 +47,7 @@ fn untransformed_shapes() -> Vec<Shape> {
 const OBJECT: u32 = 7;
 
 fn lights_of(shape: &Shape) -> Lights {
-    let lights = front_area_light(shape, Vec3::ONE, OBJECT).map(Light::Area);
+    let lights = new_front_area_light(shape, Vec3::ONE, OBJECT).map(Light::Area);
     Lights::new(std::iter::once(Light::Point(POINT)).chain(lights).collect(), &CancelToken::new())
         .expect("never canceled")
 }
@@ -107,8 +107,9 @@ fn per_lane_lights_match_single_samples() {
         ])
     };
     let facets = mesh_light(&[[DVec3::ZERO, DVec3::Y, DVec3::X], [DVec3::Z, DVec3::X, DVec3::Y]]);
-    let shapes =
-        shapes().into_iter().filter_map(|shape| front_area_light(&shape, Vec3::new(1.0, 2.0, 0.5), OBJECT));
+    let shapes = shapes()
+        .into_iter()
+        .filter_map(|shape| new_front_area_light(&shape, Vec3::new(1.0, 2.0, 0.5), OBJECT));
     let areas = shapes.chain([quad(0.0), facets, quad(-2.0)]);
     let all: Vec<Light> = std::iter::once(Light::Point(POINT)).chain(areas.map(Light::Area)).collect();
     let lights = Lights::new(all.clone(), &CancelToken::new()).expect("never canceled");
@@ -181,7 +182,8 @@ fn sample_pdf_equals_pdf_of_hit() {
 
 /// Lights on both sides of a shape. The first is on the front.
 fn two_sided(shape: &Shape) -> Lights {
-    let both = [front_area_light(shape, Vec3::ONE, OBJECT), back_area_light(shape, Vec3::ONE, OBJECT)];
+    let both =
+        [new_front_area_light(shape, Vec3::ONE, OBJECT), new_back_area_light(shape, Vec3::ONE, OBJECT)];
     let all = both.into_iter().flatten().map(Light::Area).collect();
     Lights::new(all, &CancelToken::new()).expect("never canceled")
 }
@@ -199,7 +201,7 @@ fn two_sided_samples_cover_the_visible_shape() {
         let lights = two_sided(&shape);
         // Use points around the shape and one point inside.
         let is_flat =
-            front_area_light(&shape, Vec3::ONE, 0).is_some_and(|light| light.bounds.cone.cos == 1.0);
+            new_front_area_light(&shape, Vec3::ONE, 0).is_some_and(|light| light.bounds.cone.cos == 1.0);
         let inner = shape.sample_point_on_part(0, Vec2::splat(0.5));
         let inner = (inner.point - inner.normal * 0.1).as_vec3();
         for from in points().into_iter().chain((!is_flat).then_some(inner)) {
@@ -240,7 +242,7 @@ fn two_sided_samples_cover_the_visible_shape() {
 fn back_sample_pdf_equals_pdf_of_hit() {
     let tube = Shape::Cylinder(Cylinder::new(DVec3::ZERO, DVec3::Z, 0.5, false));
     for shape in shapes().into_iter().chain([tube]) {
-        let light = Light::Area(back_area_light(&shape, Vec3::ONE, OBJECT).expect("a light"));
+        let light = Light::Area(new_back_area_light(&shape, Vec3::ONE, OBJECT).expect("a light"));
         let mut compared = 0;
         let inner = shape.sample_point_on_part(0, Vec2::splat(0.5));
         let inner = (inner.point - inner.normal * 0.1).as_vec3();
@@ -380,7 +382,7 @@ fn mesh_light(triangles: &[[DVec3; 3]]) -> AreaLight {
 fn triangle_pairs_are_sampled_like_quads() {
     let (p, u, v) = (DVec3::new(0.3, -0.2, 0.1), DVec3::X, DVec3::new(0.0, 1.0, -0.5));
     let quad = Shape::Quad(Parallelogram::new(p, u, v));
-    let quad = front_area_light(&quad, Vec3::ONE, OBJECT).expect("a light");
+    let quad = new_front_area_light(&quad, Vec3::ONE, OBJECT).expect("a light");
     let far = p + u + v;
     let (mut parts, mut seen) = ([0; 2], 0);
     for (first, second) in [
@@ -481,5 +483,5 @@ fn area_samples_are_proportional_to_area() {
 
 #[test]
 fn planes_cannot_be_lights() {
-    assert_eq!(front_area_light(&Shape::Plane(Plane::new(DVec3::ZERO, DVec3::Y)), Vec3::ONE, 0), None);
+    assert_eq!(new_front_area_light(&Shape::Plane(Plane::new(DVec3::ZERO, DVec3::Y)), Vec3::ONE, 0), None);
 }

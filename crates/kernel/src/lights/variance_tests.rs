@@ -70,7 +70,7 @@ fn named_light_shapes(gap: f64) -> Vec<(&'static str, Shape)> {
 }
 
 fn light_from_shape(shape: &Shape) -> AreaLight {
-    front_area_light(shape, Vec3::ONE, OBJECT).expect("the shape should have an area")
+    new_front_area_light(shape, Vec3::ONE, OBJECT).expect("the shape should have an area")
 }
 
 #[test]

@@ -17,7 +17,7 @@ use crate::control::ignore_progress;
 use crate::math::DVec3;
 use crate::math::limits::MAX_MAGNITUDE;
 use crate::messages::INVISIBLE_MODEL;
-use crate::scene::{BuiltValue, MORE_LIKE_THESE, SceneDocumentBuilder};
+use crate::scene::{MORE_LIKE_THESE, SceneDocumentBuilder, SceneDocumentValue};
 use crate::settings::{UpAxis, ViewSide};
 use crate::stages::mesh_warnings::MAX_WARNINGS;
 
@@ -142,7 +142,8 @@ fn scene_of_mesh(
     if needs_material {
         document.start_named_table("materials", &name);
         document.set("type", "principled");
-        document.set("color", if is_colored { 1.0.into() } else { BuiltValue::from([0.7, 0.68, 0.64]) });
+        document
+            .set("color", if is_colored { 1.0.into() } else { SceneDocumentValue::from([0.7, 0.68, 0.64]) });
     }
     document.start_list_table("mesh");
     document.set("file", file_name(path));

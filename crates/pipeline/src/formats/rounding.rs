@@ -1,7 +1,7 @@
 //! Rounds the numbers in generated scenes to keep imported scene files short.
 
 use crate::math::{DVec3, Vec2};
-use crate::scene::BuiltValue;
+use crate::scene::SceneDocumentValue;
 
 /// Returns the number with the fewest decimal digits that rounds to the same single-precision value. Numbers
 /// from 10,000 to 1e15 in magnitude are returned unchanged.
@@ -23,7 +23,7 @@ pub(super) fn shorten_pair(value: Vec2) -> [f64; 2] {
 }
 
 /// Shortens the components of a color. Grays become a single number.
-pub(super) fn shorten_color(value: DVec3) -> BuiltValue {
+pub(super) fn shorten_color(value: DVec3) -> SceneDocumentValue {
     let [red, green, blue] = value.to_array();
     if red == green && green == blue { shorten_number(red).into() } else { shorten_vector(value).into() }
 }

@@ -367,7 +367,7 @@ impl FilmState {
     }
 
     fn expected_final_samples_in_half(&self, cell: usize, half: usize, most: u32) -> u32 {
-        let (goal, expected) = (self.goals.get(cell, half), self.expected.get(cell, half));
+        let (goal, expected) = (self.goals.get(cell, half), self.expected.of_cell_half(cell, half));
         (if goal < u32::MAX { goal } else { expected }).min(most)
     }
 

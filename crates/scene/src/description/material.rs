@@ -61,7 +61,7 @@ impl MaterialKind {
     }
 
     /// The materials of a blend, or an empty slice for other materials.
-    pub fn blend_parts(&self) -> &[Material] {
+    pub fn blended_materials(&self) -> &[Material] {
         match self {
             Self::Blend { weight: _, parts } => &**parts,
             Self::Phong(_)
@@ -76,7 +76,7 @@ impl MaterialKind {
 
     /// Whether a property holds for any part of a blend.
     fn any_blend_part_is(&self, property: impl Fn(&Material) -> bool) -> bool {
-        self.blend_parts().iter().any(property)
+        self.blended_materials().iter().any(property)
     }
 
     /// Whether the material is solid glass with index of refraction 1, which does not refract in air.
@@ -270,7 +270,7 @@ impl Material {
 
     /// The material itself and, for a blend, all of its parts.
     pub fn self_and_blend_parts(&self) -> Vec<&Self> {
-        let parts = self.kind.blend_parts().iter().flat_map(Self::self_and_blend_parts);
+        let parts = self.kind.blended_materials().iter().flat_map(Self::self_and_blend_parts);
         std::iter::once(self).chain(parts).collect()
     }
 

@@ -115,7 +115,7 @@ impl BlendResolver<'_> {
 
 /// Number of materials in a blend that are not blends.
 fn leaf_count(kind: &MaterialKind) -> usize {
-    match kind.blend_parts() {
+    match kind.blended_materials() {
         [] => 1,
         parts => parts.iter().map(|part| leaf_count(&part.kind)).sum(),
     }

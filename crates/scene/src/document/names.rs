@@ -12,12 +12,12 @@ use super::context::{FileContext, Issue};
 pub(super) struct DefinedNames {
     /// `texture`, `material` or `group`.
     pub(super) kind: &'static str,
-    entries: Vec<NameEntry>,
+    entries: Vec<DefinedName>,
     indices: HashMap<String, usize>,
 }
 
 /// A defined name.
-struct NameEntry {
+struct DefinedName {
     name: String,
     span: Range<usize>,
     used: Cell<bool>,
@@ -25,8 +25,8 @@ struct NameEntry {
 
 impl DefinedNames {
     pub(super) fn new(kind: &'static str, names: impl Iterator<Item = (String, Range<usize>)>) -> Self {
-        let entries: Vec<NameEntry> =
-            names.map(|(name, span)| NameEntry { name, span, used: Cell::new(false) }).collect();
+        let entries: Vec<DefinedName> =
+            names.map(|(name, span)| DefinedName { name, span, used: Cell::new(false) }).collect();
         let indices = entries.iter().enumerate().map(|(index, entry)| (entry.name.clone(), index)).collect();
         Self { kind, entries, indices }
     }

@@ -34,7 +34,7 @@ pub enum ReportTextRole {
 }
 
 /// Returns the same report as [`super::render_diagnostics`], as styled lines.
-pub fn report_lines(diagnostics: &[Diagnostic], width: usize) -> Vec<ReportLine> {
+pub fn render_diagnostics_as_lines(diagnostics: &[Diagnostic], width: usize) -> Vec<ReportLine> {
     let renderer = Renderer::plain()
         .error(AnsiColor::Red.on_default())
         .warning(AnsiColor::Yellow.on_default())
@@ -63,7 +63,7 @@ fn parse_styled_spans(line: &str) -> ReportLine {
     pieces
 }
 
-/// Returns the role that a color code marks in [`report_lines`].
+/// Returns the role that a color code marks in [`render_diagnostics_as_lines`].
 fn role_from_color_code(codes: &str) -> ReportTextRole {
     match codes {
         "31" => ReportTextRole::Error,

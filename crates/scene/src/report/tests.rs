@@ -109,7 +109,7 @@ fn long_messages_are_wrapped() {
 fn lines_match_the_plain_report() {
     let source: Arc<str> = "radius = -0.5 # \u{1b}[31m\n".into();
     let diagnostics = [at(&source, 9..13, "found -0.5")];
-    let lines = report_lines(&diagnostics, 80);
+    let lines = render_diagnostics_as_lines(&diagnostics, 80);
     let joined: Vec<String> =
         lines.iter().map(|line| line.iter().map(|piece| piece.text.as_str()).collect()).collect();
     assert_eq!(joined.join("\n") + "\n", render_diagnostics(&diagnostics, 80, ReportStyle::Plain));
@@ -141,7 +141,7 @@ fn labels_are_never_cut() {
         render_diagnostics(std::slice::from_ref(&one), 200, ReportStyle::Plain).contains("^^^^^^^^^ `u` and")
     );
     assert!(
-        report_lines(std::slice::from_ref(&one), 60)
+        render_diagnostics_as_lines(std::slice::from_ref(&one), 60)
             .iter()
             .all(|line| { line.iter().map(|piece| piece.text.chars().count()).sum::<usize>() <= 60 })
     );

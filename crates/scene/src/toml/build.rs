@@ -41,7 +41,7 @@ pub struct InMemoryFile {
 
 /// A value in a [`SceneDocumentBuilder`].
 #[derive(Clone, Debug, PartialEq)]
-pub enum BuiltValue {
+pub enum SceneDocumentValue {
     /// A number.
     Number(f64),
     /// A string.
@@ -54,43 +54,43 @@ pub enum BuiltValue {
     Table(Vec<(&'static str, Self)>),
 }
 
-impl From<f64> for BuiltValue {
+impl From<f64> for SceneDocumentValue {
     fn from(number: f64) -> Self {
         Self::Number(number)
     }
 }
 
-impl From<bool> for BuiltValue {
+impl From<bool> for SceneDocumentValue {
     fn from(flag: bool) -> Self {
         Self::Flag(flag)
     }
 }
 
-impl From<&'static str> for BuiltValue {
+impl From<&'static str> for SceneDocumentValue {
     fn from(text: &'static str) -> Self {
         Self::Text(text.into())
     }
 }
 
-impl From<String> for BuiltValue {
+impl From<String> for SceneDocumentValue {
     fn from(text: String) -> Self {
         Self::Text(text.into())
     }
 }
 
-impl From<Vec<f64>> for BuiltValue {
+impl From<Vec<f64>> for SceneDocumentValue {
     fn from(numbers: Vec<f64>) -> Self {
         Self::Array(numbers.into_iter().map(Self::Number).collect())
     }
 }
 
-impl<const N: usize> From<[f64; N]> for BuiltValue {
+impl<const N: usize> From<[f64; N]> for SceneDocumentValue {
     fn from(numbers: [f64; N]) -> Self {
         numbers.to_vec().into()
     }
 }
 
-impl From<DVec3> for BuiltValue {
+impl From<DVec3> for SceneDocumentValue {
     fn from(vector: DVec3) -> Self {
         vector.to_array().into()
     }
@@ -193,7 +193,7 @@ impl SceneDocumentBuilder {
     }
 
     /// Adds a key, which must be new, to the current table.
-    pub fn set(&mut self, key: &'static str, value: impl Into<BuiltValue>) {
+    pub fn set(&mut self, key: &'static str, value: impl Into<SceneDocumentValue>) {
         let kind = self.add_value_node(value.into());
         self.add_entry(self.table, key.into(), kind);
     }
@@ -217,21 +217,21 @@ impl SceneDocumentBuilder {
         self.document.add_entry(table, name, ValueNode { span: self.span, kind });
     }
 
-    fn add_value_node(&mut self, value: BuiltValue) -> NodeKind {
+    fn add_value_node(&mut self, value: SceneDocumentValue) -> NodeKind {
         match value {
             // Files contain 0 instead of -0.
-            BuiltValue::Number(number) => self.document.add_number(number + 0.0),
-            BuiltValue::Text(text) => {
+            SceneDocumentValue::Number(number) => self.document.add_number(number + 0.0),
+            SceneDocumentValue::Text(text) => {
                 NodeKind::String(self.document.store_decoded_string(Span::default(), text))
             }
-            BuiltValue::Flag(flag) => NodeKind::Boolean(flag),
-            BuiltValue::Array(values) => {
+            SceneDocumentValue::Flag(flag) => NodeKind::Boolean(flag),
+            SceneDocumentValue::Array(values) => {
                 let span = self.span;
                 let node = |value| ValueNode { span, kind: self.add_value_node(value) };
                 let elements: Vec<ValueNode> = values.into_iter().map(node).collect();
                 self.document.add_array(&elements)
             }
-            BuiltValue::Table(entries) => {
+            SceneDocumentValue::Table(entries) => {
                 let table =
                     self.document.add_table(TableOrigin { is_inline: true, ..TableOrigin::default() });
                 for (key, value) in entries {
@@ -264,8 +264,10 @@ mod tests {
             built.start_named_table("textures", texture);
             built.set("file", format!("{texture}.png"));
             built.start_named_table("materials", material);
-            built
-                .set("emission", BuiltValue::Table(vec![("texture", texture.into()), ("scale", 0.5.into())]));
+            built.set(
+                "emission",
+                SceneDocumentValue::Table(vec![("texture", texture.into()), ("scale", 0.5.into())]),
+            );
         }
         built.start_list_table("mesh");
         built.set("smooth", false);

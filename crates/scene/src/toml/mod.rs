@@ -35,7 +35,7 @@ mod write;
 use assembly::DocumentBuilder;
 use expression::TomlExpressionParser;
 
-pub use build::{BuiltValue, InMemoryFile, SceneDocumentBuilder};
+pub use build::{InMemoryFile, SceneDocumentBuilder, SceneDocumentValue};
 pub use write::quote_toml_string;
 
 pub(super) use brackets::{BracketToken, find_all_array_brackets, innermost_bracket_open_at_end};

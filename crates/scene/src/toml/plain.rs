@@ -153,8 +153,8 @@ impl<'s> LineCursor<'s> {
     fn read_scalar(&mut self) -> Option<ValueNode> {
         let start = self.at;
         let kind = match self.peek() {
-            b'"' => self.read_quoted(|byte| byte != b'"' && byte != b'\\')?,
-            b'\'' => self.read_quoted(|byte| byte != b'\'')?,
+            b'"' => self.read_plain_string(|byte| byte != b'"' && byte != b'\\')?,
+            b'\'' => self.read_plain_string(|byte| byte != b'\'')?,
             b't' => self.read_boolean("true", true)?,
             b'f' => self.read_boolean("false", false)?,
             _ => self.read_number()?,
@@ -162,7 +162,7 @@ impl<'s> LineCursor<'s> {
         Some(ValueNode { span: Span::new(start, self.at), kind })
     }
 
-    fn read_quoted(&mut self, is_plain: impl Fn(u8) -> bool) -> Option<NodeKind> {
+    fn read_plain_string(&mut self, is_plain: impl Fn(u8) -> bool) -> Option<NodeKind> {
         let quote = self.peek();
         self.at += 1;
         let length =

@@ -201,7 +201,7 @@ impl World {
                 mesh.and_then(|mesh| mesh.intersect_segment_with_triangle(triangle, ends))
             {
                 let hit = Hit { shape, object };
-                found(self.coincident_surface_at_hit(hit, self.material_index(&hit) as u32, is_front));
+                found(self.wrap_coincident_hit(hit, self.material_index(&hit) as u32, is_front));
             }
         }
         if is_led || closed_lead { sides } else { OffsetPoints { before: probe.close, ..sides } }
@@ -224,15 +224,10 @@ impl World {
         let own = shape.intersect(&ray)?;
         let is_front =
             shape.surface_point_with_fields(&ray, &own, bare).normal.as_dvec3().dot(ray.direction) < 0.0;
-        Some(self.coincident_surface_at_hit(Hit { shape: own, object }, material, is_front))
+        Some(self.wrap_coincident_hit(Hit { shape: own, object }, material, is_front))
     }
 
-    fn coincident_surface_at_hit(
-        &self,
-        hit: Hit,
-        material: u32,
-        is_front: bool,
-    ) -> CoincidentOrEnclosingSurface {
+    fn wrap_coincident_hit(&self, hit: Hit, material: u32, is_front: bool) -> CoincidentOrEnclosingSurface {
         let is_inside_out = self.is_glass_material(material) && self.glass_solids.is_inside_out(hit.object);
         CoincidentOrEnclosingSurface::Surface { hit, material, is_front: is_front != is_inside_out }
     }

@@ -18,8 +18,8 @@ use crate::lights::infinite::{
 };
 use crate::lights::{
     AreaLight, BlendPartWeight, BoundingSphere, EmissionModulation, EmissionTerm, Light, LightBounds, Lights,
-    PhotonEmitter, Side, TriangleWithUvs, UvMapping, back_area_light, create_see_through_side_light,
-    front_area_light,
+    PhotonEmitter, Side, TriangleWithUvs, UvMapping, create_see_through_side_light, new_back_area_light,
+    new_front_area_light,
 };
 use crate::lights::{Emitter, EmittingPart};
 use crate::materials::texels::Texels;
@@ -239,8 +239,8 @@ fn area_lights_of_shape(
         let (radiance, terms) = emissive.radiance_and_terms(*side);
         let light = match (emissive.is_sheer, side) {
             (true, side) => create_see_through_side_light(shape, *side, radiance, object)?,
-            (false, Side::Front) => front_area_light(shape, radiance, object)?,
-            (false, Side::Back) => back_area_light(shape, radiance, object)?,
+            (false, Side::Front) => new_front_area_light(shape, radiance, object)?,
+            (false, Side::Back) => new_back_area_light(shape, radiance, object)?,
         };
         let light = AreaLight { bounds: scale_light_bounds_by_term_means(light.bounds, &terms), ..light };
         Some(match EmissionModulation::from_terms(terms, UvMapping::Shape(shape.clone())) {

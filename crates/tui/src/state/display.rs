@@ -10,7 +10,7 @@ use crate::mosaic::CellGrid;
 use crate::pixel_request::UnconfirmedImageProtocol;
 use crate::preview_style::PreviewStyle;
 use crate::terminal_replies::TerminalQueries;
-use crate::terminals::DesktopIntegration;
+use crate::terminals::TerminalExtras;
 
 /// Window size, terminal capabilities and preview settings.
 pub(crate) struct TerminalDisplayState {
@@ -23,7 +23,7 @@ pub(crate) struct TerminalDisplayState {
     /// Terminal queries that have been sent.
     pub ask: TerminalQueries,
     /// Terminal capabilities beyond text.
-    pub capabilities: DesktopIntegration,
+    pub capabilities: TerminalExtras,
     /// How long a render must run for its end to trigger a notification. `None` disables notifications.
     pub notify_after: Option<Duration>,
     /// Whether the window is focused, according to the terminal.

@@ -25,7 +25,7 @@ use super::event::WindowSize;
 use super::options::ExternalChange;
 use super::preview_style::PreviewStyle;
 use super::terminal_replies::TerminalQueries;
-use super::terminals::DesktopIntegration;
+use super::terminals::TerminalExtras;
 pub(super) use crate::pipeline::key_overrides::{KeyboardOverrides, format_exposure_stops};
 use crate::pipeline::settings::Overrides;
 use crate::scene::diagnostic::{Diagnostic, Severity};
@@ -44,7 +44,7 @@ pub(super) struct InitialState {
     /// Terminal queries that have been sent.
     pub ask: TerminalQueries,
     /// Terminal capabilities beyond text, according to environment variables.
-    pub capabilities: DesktopIntegration,
+    pub capabilities: TerminalExtras,
     /// How long a render must run for its end to trigger a notification. `None` disables notifications.
     pub notify_after: Option<Duration>,
 }

@@ -150,7 +150,7 @@ mod tests {
     use crate::pipeline::protocol::Command;
     use crate::pixel_request::MultiplexerPassthrough;
     use crate::terminal_replies::TerminalQueries;
-    use crate::terminals::{DesktopIntegration, TerminalBrand};
+    use crate::terminals::{TerminalBrand, TerminalExtras};
     use crate::update::request_first_render;
 
     /// A UI whose user has requested kitty images.
@@ -213,7 +213,7 @@ mod tests {
         let before = state.request.preview_size.expect("a size");
         let foot = TerminalReply::Name(TerminalId { brand: TerminalBrand::Foot, version: [1, 20] });
         assert!(handle_reply(&mut state, foot).is_empty(), "the name was not queried");
-        assert_eq!(state.display.capabilities, DesktopIntegration::default());
+        assert_eq!(state.display.capabilities, TerminalExtras::default());
         state.display.ask = TerminalQueries { blocks: true, ..TerminalQueries::default() };
         let effects = handle_reply(&mut state, foot);
         let [Effect::Send(Command::Preview(Some(size)))] = &effects[..] else { panic!("{effects:?}") };

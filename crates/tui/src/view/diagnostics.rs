@@ -153,7 +153,7 @@ fn format_diagnostic_with_positions(fault: &[&Diagnostic], width: usize) -> Vec<
     };
     let line =
         |line: report::ReportLine| line.into_iter().map(|piece| (piece.text, tone(piece.role))).collect();
-    let mut lines = report::report_lines(std::slice::from_ref(fault[0]), width);
+    let mut lines = report::render_diagnostics_as_lines(std::slice::from_ref(fault[0]), width);
     // Drop the empty line and the count that end the report, because the title already contains the count.
     lines.truncate(lines.len().saturating_sub(2));
     let mut lines: Vec<StyledLine> = lines.into_iter().map(line).collect();

@@ -71,7 +71,7 @@ pub struct TexturedValue {
     /// The factor. A scalar is stored in all components.
     pub factor: DVec3,
     /// Texture scaled by the factor.
-    pub texture: Option<TextureRef>,
+    pub texture: Option<TextureLookup>,
 }
 
 impl TexturedValue {
@@ -94,7 +94,7 @@ pub enum TextureWrap {
 
 /// A texture lookup, with v = 0 at the bottom. Coordinates are scaled, then rotated, then translated.
 #[derive(Clone, Debug, PartialEq)]
-pub struct TextureRef {
+pub struct TextureLookup {
     /// Index of the image.
     pub image: usize,
     /// Whether to use the nearest texel instead of interpolating.
@@ -171,7 +171,7 @@ pub struct ModelMaterial {
     /// Emitted radiance.
     pub emission: TexturedValue,
     /// Normal map.
-    pub normal: Option<TextureRef>,
+    pub normal: Option<TextureLookup>,
     /// Scale factor for the normal map's slopes.
     pub normal_strength: f64,
     /// Opacity.

@@ -2,7 +2,7 @@
 //! `KHR_materials_*`).
 
 use super::description::{
-    AlphaMode, DiffuseTransmission, ImportNotes, ModelMaterial, TextureRef, TextureWrap, TexturedValue,
+    AlphaMode, DiffuseTransmission, ImportNotes, ModelMaterial, TextureLookup, TextureWrap, TexturedValue,
     TintedGlass,
 };
 use super::json::{
@@ -314,7 +314,7 @@ impl MaterialConverter<'_> {
     }
 
     /// Converts a texture reference, and adds notes about unsupported features.
-    fn texture_ref_from_gltf(&mut self, info: &TextureInfo) -> Result<Option<TextureRef>, GltfError> {
+    fn texture_ref_from_gltf(&mut self, info: &TextureInfo) -> Result<Option<TextureLookup>, GltfError> {
         let root = &self.container.root;
         let texture = root.textures.get(info.index);
         let texture = texture
@@ -351,7 +351,7 @@ impl MaterialConverter<'_> {
         let is_nearest = sampler.is_some_and(|sampler| sampler.mag_filter == Some(NEAREST));
         let plain = TextureTransform::default();
         let transform = UvTransform::from_gltf(info.extensions.transform.as_ref().unwrap_or(&plain));
-        Ok(Some(TextureRef {
+        Ok(Some(TextureLookup {
             image,
             is_nearest,
             wrap,

@@ -26,7 +26,7 @@ use std::path::{Path, PathBuf};
 use self::container::DRACO;
 pub use self::description::{
     AffineMap, AlphaMode, DiffuseTransmission, ModelCamera, ModelInstance, ModelLight, ModelLightKind,
-    ModelMaterial, ModelProjection, ModelScene, TextureRef, TextureWrap, TexturedValue, TintedGlass,
+    ModelMaterial, ModelProjection, ModelScene, TextureLookup, TextureWrap, TexturedValue, TintedGlass,
 };
 use self::json::{JsonImage, Root, Uri};
 pub use self::references::referenced_files;

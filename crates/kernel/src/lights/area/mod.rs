@@ -1,7 +1,7 @@
 //! Emitting shapes, one file each.
 //!
 //! Each shape implements its light sampling in a [`ShapeEmitter`]. To add a shape, add its file, a variant of
-//! [`Emitter`], and arms in `of_any` and [`front_area_light`]. If the shape is flat, also add bounds on its
+//! [`Emitter`], and arms in `of_any` and [`new_front_area_light`]. If the shape is flat, also add bounds on its
 //! emission. Shapes without a loop in `packet` are sampled point by point.
 
 pub mod cuboid;
@@ -192,7 +192,7 @@ impl Emitter {
 }
 
 /// Creates the light on the front of a shape, or returns `None` if the shape is infinite or has no area.
-pub fn front_area_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<AreaLight> {
+pub fn new_front_area_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<AreaLight> {
     let (emitter, bounds) = (front_emitter(shape)?, emission_bounds(shape, radiance)?);
     let (side, modulation, part) = (Side::Front, None, EmittingPart::Whole);
     Some(AreaLight { shape: emitter, side, radiance, modulation, object, part, bounds })
@@ -238,8 +238,8 @@ pub fn create_see_through_side_light(
         (Shape::Torus(_) | Shape::Transformed(_), _) => true,
     };
     let light = match side {
-        Side::Front => front_area_light(shape, radiance, object)?,
-        Side::Back => back_area_light(shape, radiance, object)?,
+        Side::Front => new_front_area_light(shape, radiance, object)?,
+        Side::Back => new_back_area_light(shape, radiance, object)?,
     };
     let see_through = if hides_itself { SeeThroughSideEmitter::new(shape, side) } else { None };
     Some(match see_through {
@@ -249,9 +249,9 @@ pub fn create_see_through_side_light(
 }
 
 /// Creates the light on the back of a shape, or returns `None` if the shape is infinite or has no area.
-pub fn back_area_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<AreaLight> {
+pub fn new_back_area_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<AreaLight> {
     let turned = turned_over_if_flat(shape);
-    let light = front_area_light(turned.as_ref().unwrap_or(shape), radiance, object)?;
+    let light = new_front_area_light(turned.as_ref().unwrap_or(shape), radiance, object)?;
     let emitter = match turned {
         Some(_) => light.shape,
         None => Emitter::Inside(Box::new(InwardEmitter::new(shape)?)),

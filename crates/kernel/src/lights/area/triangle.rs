@@ -34,7 +34,7 @@ struct SphericalTriangle {
 impl ShapeEmitter for TriangleEmitter {
     /// Samples uniformly over the solid angle, or over the area for small solid angles.
     fn sample(&self, point: Vec3, u: [f32; 2]) -> SampledLightPoint {
-        let Some((offsets, spherical)) = self.spherical_triangle(point.as_dvec3()) else {
+        let Some((offsets, spherical)) = self.spherical_triangle_if_in_front(point.as_dvec3()) else {
             return SampledLightPoint::NOTHING;
         };
         let (direction, distance, factor) = if spherical.has_accurate_solid_angle() {
@@ -55,7 +55,7 @@ impl ShapeEmitter for TriangleEmitter {
     }
 
     fn pdf(&self, from: Vec3, hit: &LightHitPoint) -> f32 {
-        match self.spherical_triangle(from.as_dvec3()) {
+        match self.spherical_triangle_if_in_front(from.as_dvec3()) {
             Some((_, spherical)) if spherical.has_accurate_solid_angle() => {
                 (1.0 / spherical.solid_angle) as f32
             }
@@ -85,7 +85,7 @@ impl TriangleEmitter {
 
     /// The triangle seen from a point: the offsets to its corners and the spherical triangle, or `None` if
     /// the point is behind the triangle.
-    fn spherical_triangle(&self, point: DVec3) -> Option<([DVec3; 3], SphericalTriangle)> {
+    fn spherical_triangle_if_in_front(&self, point: DVec3) -> Option<([DVec3; 3], SphericalTriangle)> {
         let offsets = self.corners.map(|corner| corner - point);
         let corners = offsets.map(DVec3::normalize);
         let [a, b, c] = corners;

@@ -20,7 +20,7 @@ use crate::lights::infinite::sky::{Sky, SkyFrame, SkyModelInputs};
 use crate::lights::infinite::{DirectionalLight, Environment, EnvironmentMap};
 use crate::lights::{
     AreaLight, EmissionModulation, Emitter, EmittingPart, MeshEmitter, TriangleWithUvs, UvMapping,
-    front_area_light,
+    new_front_area_light,
 };
 use crate::materials::texels::{TexelData, Texels};
 use crate::materials::texture::{ImageTexture, Texture, TextureFilter, TextureMapping, Wrap};
@@ -144,7 +144,7 @@ fn lights() -> Vec<(Light, Option<Shape>, f64)> {
     }
     all.push((Light::Environment(Environment::Constant(COLOR)), None, 4.0 * PI * disk));
     for shape in shapes() {
-        let light = front_area_light(&shape, COLOR, OBJECT).expect("an area");
+        let light = new_front_area_light(&shape, COLOR, OBJECT).expect("an area");
         let parts = 0..shape.local_part_areas().len() as u32;
         let area: f64 = parts
             .map(|part| {
@@ -358,7 +358,7 @@ fn photons_leave_convex_lights() {
         if is_open || matches!(shape, Shape::Torus(_)) {
             continue;
         }
-        let light = Light::Area(front_area_light(&shape, COLOR, OBJECT).expect("an area"));
+        let light = Light::Area(new_front_area_light(&shape, COLOR, OBJECT).expect("an area"));
         let source = source_of(light, Some(&shape));
         let mut next = numbers(random::unit_generator(2));
         for _ in 0..20_000 {
@@ -390,7 +390,7 @@ fn cell(share: f64, n: usize) -> usize {
 fn photon_directions_follow_the_intensity() {
     let count = 400_000;
     for shape in shapes() {
-        let light = Light::Area(front_area_light(&shape, COLOR, OBJECT).expect("an area"));
+        let light = Light::Area(new_front_area_light(&shape, COLOR, OBJECT).expect("an area"));
         let source = source_of(light, Some(&shape));
         let (mut next, mut counts) = (numbers(random::unit_generator(3)), [0; 256]);
         for _ in 0..count {

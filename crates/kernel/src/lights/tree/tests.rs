@@ -12,7 +12,9 @@ use crate::geometry::sphere::Sphere;
 use crate::geometry::triangle::Triangle;
 use crate::lights::delta::{Falloff, PointLight, SpotLight};
 use crate::lights::infinite::{DirectionalLight, Environment};
-use crate::lights::{AreaLight, Emitter, EmittingPart, Light, Lights, MeshEmitter, Side, front_area_light};
+use crate::lights::{
+    AreaLight, Emitter, EmittingPart, Light, Lights, MeshEmitter, Side, new_front_area_light,
+};
 use crate::math::lanes::PortableSimd;
 use crate::math::{DVec3, Vec3, random};
 
@@ -42,7 +44,7 @@ fn any_light(object: u32, next: &mut impl FnMut() -> f32) -> Light {
         8 => Shape::Box(OrientedBox::new(place, across.abs() * size + 0.001, direction * 90.0)),
         _ => Shape::Cylinder(Cylinder::new(place, place + direction * size, size * 0.3, true)),
     };
-    Light::Area(front_area_light(&shape, color, object).expect("expected a finite shape"))
+    Light::Area(new_front_area_light(&shape, color, object).expect("expected a finite shape"))
 }
 
 fn lights_of(count: u32, next: &mut impl FnMut() -> f32) -> Vec<Light> {
@@ -245,7 +247,7 @@ fn noncontributing_lights_are_not_picked() {
     let point_at = |position| PointLight { position, intensity: Vec3::ONE, falloff: Falloff::Square };
     let disk = |place, normal| {
         let disk = Shape::Disk(Disk::new(place, normal, 0.05));
-        Light::Area(front_area_light(&disk, Vec3::ONE, 0).expect("expected a finite shape"))
+        Light::Area(new_front_area_light(&disk, Vec3::ONE, 0).expect("expected a finite shape"))
     };
     let spot =
         |place, axis| Light::Spot(SpotLight { point: point_at(place), axis, half_angle: 0.3, blend: 0.2 });

@@ -6,10 +6,10 @@ use super::super::{ForeignScene, scene_from_document};
 use super::ForeignError;
 use crate::assets::AssetError;
 use crate::control::CancelToken;
-use crate::scene::BuiltValue;
+use crate::scene::SceneDocumentValue;
 
 /// The keys and values of a table.
-pub(crate) type TableEntries = Vec<(&'static str, BuiltValue)>;
+pub(crate) type TableEntries = Vec<(&'static str, SceneDocumentValue)>;
 
 /// A file to copy during an import.
 #[derive(Clone, Debug)]

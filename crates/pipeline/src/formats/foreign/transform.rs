@@ -1,7 +1,7 @@
 //! Transforms in foreign scenes, and the scene keys for them.
 
 use crate::math::{DMat3, DMat4, DVec3};
-use crate::scene::BuiltValue;
+use crate::scene::SceneDocumentValue;
 
 /// Rotation by `degrees` about an axis: cos θ·I + sin θ·\[a\]ₓ + (1 − cos θ)·a·aᵀ. The axis is not
 /// normalized; unless it has unit length, the result is not a rotation.
@@ -29,7 +29,7 @@ pub(crate) fn sin_cos_degrees(degrees: f64) -> (f64, f64) {
 }
 
 /// Value of the `matrix` key of a shape or instance: 16 numbers in row-major order.
-pub(crate) fn matrix_value(matrix: &DMat4) -> BuiltValue {
+pub(crate) fn matrix_value(matrix: &DMat4) -> SceneDocumentValue {
     let rows = matrix.transpose().to_cols_array();
     rows.map(zero_if_negligible).into()
 }

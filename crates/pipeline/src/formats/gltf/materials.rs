@@ -6,11 +6,11 @@ use super::super::model::UsedNames;
 use super::super::rounding::{shorten_color, shorten_number, shorten_pair};
 use super::SceneBuilder;
 use crate::assets::gltf::{
-    AlphaMode, DiffuseTransmission, ModelMaterial, TextureRef, TextureWrap, TexturedValue,
+    AlphaMode, DiffuseTransmission, ModelMaterial, TextureLookup, TextureWrap, TexturedValue,
 };
 use crate::formats::foreign::import::TableEntries;
 use crate::math::{DVec3, Vec2};
-use crate::scene::BuiltValue;
+use crate::scene::SceneDocumentValue;
 
 /// A texture's file.
 #[derive(Clone, Debug, PartialEq)]
@@ -113,7 +113,7 @@ impl MaterialBuilder<'_, '_> {
         let document = &mut self.scene.document;
         document.start_named_table("materials", name);
         document.set("type", "blend");
-        document.set("materials", BuiltValue::Array(parts.map(BuiltValue::from).to_vec()));
+        document.set("materials", SceneDocumentValue::Array(parts.map(SceneDocumentValue::from).to_vec()));
         keys.into_iter().for_each(|(key, value)| document.set(key, value));
     }
 
@@ -169,7 +169,10 @@ impl MaterialBuilder<'_, '_> {
                     let scale =
                         (emission.factor != DVec3::ONE).then(|| ("scale", shorten_color(emission.factor)));
                     let texture = ("texture", name.into());
-                    keys.push(("emission", BuiltValue::Table([texture].into_iter().chain(scale).collect())));
+                    keys.push((
+                        "emission",
+                        SceneDocumentValue::Table([texture].into_iter().chain(scale).collect()),
+                    ));
                 }
                 None => keys.push(("emission", shorten_color(emission.factor))),
             }
@@ -231,7 +234,7 @@ impl MaterialBuilder<'_, '_> {
         match &slot.texture {
             Some(texture) => {
                 let name = self.ensure_texture_table(texture, TextureUse::Colors, slot.factor);
-                keys.push((key, BuiltValue::Table(vec![("texture", name.into())])));
+                keys.push((key, SceneDocumentValue::Table(vec![("texture", name.into())])));
             }
             None if slot.factor != DVec3::splat(usual) => {
                 let most = if key == "color" { slot.factor.min(DVec3::ONE) } else { slot.factor };
@@ -260,7 +263,7 @@ impl MaterialBuilder<'_, '_> {
     }
 
     /// Returns a texture's name, adding its table if the texture is new.
-    fn ensure_texture_table(&mut self, texture: &TextureRef, use_: TextureUse, factor: DVec3) -> String {
+    fn ensure_texture_table(&mut self, texture: &TextureLookup, use_: TextureUse, factor: DVec3) -> String {
         let mut keys = TableEntries::new();
         if texture.is_nearest {
             keys.push(("filter", "nearest".into()));
@@ -305,6 +308,6 @@ impl MaterialBuilder<'_, '_> {
 }
 
 /// Returns the value that reads a number from a texture's channel.
-fn texture_channel_reference(texture: String, channel: &'static str) -> BuiltValue {
-    BuiltValue::Table(vec![("texture", texture.into()), ("channel", channel.into())])
+fn texture_channel_reference(texture: String, channel: &'static str) -> SceneDocumentValue {
+    SceneDocumentValue::Table(vec![("texture", texture.into()), ("channel", channel.into())])
 }

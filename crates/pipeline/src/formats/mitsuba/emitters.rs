@@ -11,7 +11,7 @@ use crate::formats::foreign::import::TableEntries;
 use crate::formats::foreign::transform::linear_part;
 use crate::formats::rounding::{shorten_color, shorten_number};
 use crate::math::{DMat3, DMat4, DVec3};
-use crate::scene::BuiltValue;
+use crate::scene::SceneDocumentValue;
 
 /// Emitter plugins of Mitsuba 3, 2 and 0.6.
 const KNOWN_EMITTERS: [&str; 12] = [
@@ -73,7 +73,7 @@ impl<'a> SceneReader<'a> {
 
     fn add_point_light(&mut self, object: &'a PluginInstance) {
         let intensity = self.light_color(object, "intensity");
-        let position = match self.vector(object, "position") {
+        let position = match self.vector_property(object, "position") {
             Some(position) => position,
             None => self.world_matrix(object).w_axis.truncate(),
         };
@@ -122,7 +122,7 @@ impl<'a> SceneReader<'a> {
 
     fn add_directional_light(&mut self, object: &'a PluginInstance) {
         let irradiance = self.light_color(object, "irradiance");
-        let direction = match self.vector(object, "direction") {
+        let direction = match self.vector_property(object, "direction") {
             Some(direction) => direction,
             None => self.world_matrix(object).z_axis.truncate(),
         };
@@ -247,7 +247,7 @@ impl<'a> SceneReader<'a> {
             ColorSource::Texture(_) => DVec3::splat(0.3),
         };
         let matrix = self.world_matrix(object);
-        let direction = self.vector(object, "sun_direction");
+        let direction = self.vector_property(object, "sun_direction");
         let angle = self.float(object, "sun_aperture").unwrap_or(0.5338)
             * self.float(object, "sun_radius_scale").unwrap_or(1.0);
         for name in [
@@ -309,7 +309,7 @@ impl<'a> SceneReader<'a> {
         }
         // In Mitsuba, the lower hemisphere is black.
         sky.push(("ground_scale", 0.0.into()));
-        self.document.set("sky", BuiltValue::Table(sky));
+        self.document.set("sky", SceneDocumentValue::Table(sky));
         self.set_environment_matrix(object, linear_part(&matrix) * to_local.transpose());
         let text = "the sun is up to 8.5 % dimmer than in Mitsuba's RGB mode";
         self.notes.note(&format!("`{}`", object.plugin), text, object.span.clone());

@@ -15,7 +15,7 @@ use crate::formats::foreign::import::TableEntries;
 use crate::formats::foreign::meshes::MeshData;
 use crate::formats::foreign::pixels::Pixels;
 use crate::math::{DMat4, DVec2, DVec3, Vec3};
-use crate::scene::BuiltValue;
+use crate::scene::SceneDocumentValue;
 
 /// Maximum size of a file with attributes.
 const MAX_BYTES: u64 = 1 << 30;
@@ -160,7 +160,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Returns the reflectance of a diffuse surface that multiplies the colors of vertices.
-    pub(super) fn vertex_color_scale(&mut self, object: &'a PluginInstance) -> Option<BuiltValue> {
+    pub(super) fn vertex_color_scale(&mut self, object: &'a PluginInstance) -> Option<SceneDocumentValue> {
         let texture = self.object_by_index(object.named_child("reflectance")?.target);
         let has_colors = self.attributes.as_ref().is_some_and(|mesh| !mesh.colors.is_empty());
         if !has_colors || !is_attribute_texture(&texture.plugin) {

@@ -16,7 +16,7 @@ use crate::control::ignore_progress;
 use crate::formats::foreign::pixels::Pixels;
 use crate::formats::rounding::{shorten_color, shorten_number};
 use crate::math::{DMat4, DVec2, DVec3, Vec3};
-use crate::scene::BuiltValue;
+use crate::scene::SceneDocumentValue;
 use crate::system::file::FileStamp;
 
 /// Distance of the pane, relative to the distance of the light's target.
@@ -147,7 +147,7 @@ impl<'a> SceneReader<'a> {
         self.document.set("type", "glass");
         self.document.set("ior", 1.0);
         self.document.set("thin", true);
-        self.document.set("tint", BuiltValue::Table(vec![("texture", texture.to_owned().into())]));
+        self.document.set("tint", SceneDocumentValue::Table(vec![("texture", texture.to_owned().into())]));
         name
     }
 

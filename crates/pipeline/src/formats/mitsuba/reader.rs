@@ -322,7 +322,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Returns a vector property. Other types are errors.
-    pub(super) fn vector(&mut self, object: &PluginInstance, name: &str) -> Option<DVec3> {
+    pub(super) fn vector_property(&mut self, object: &PluginInstance, name: &str) -> Option<DVec3> {
         let property = object.property(name)?;
         match &property.value {
             PropertyValue::Vector(vector) => Some(*vector),

@@ -269,7 +269,7 @@ impl<'a> SceneReader<'a> {
 
     fn add_sphere(&mut self, object: &'a PluginInstance, target: ShapeTarget<'_>) -> bool {
         let Some(matrix) = self.shape_transform(object) else { return false };
-        let center = self.vector(object, "center").unwrap_or(DVec3::ZERO);
+        let center = self.vector_property(object, "center").unwrap_or(DVec3::ZERO);
         let radius = self.float(object, "radius").unwrap_or(1.0);
         let is_flipped = self.boolean(object, "flip_normals", false);
         // glimt's poles are at ±y, Mitsuba's at ±z, and u is 0 on opposite sides.
@@ -311,8 +311,8 @@ impl<'a> SceneReader<'a> {
 
     fn add_cylinder(&mut self, object: &'a PluginInstance, target: ShapeTarget<'_>) -> bool {
         let Some(matrix) = self.shape_transform(object) else { return false };
-        let start = self.vector(object, "p0").unwrap_or(DVec3::ZERO);
-        let end = self.vector(object, "p1").unwrap_or(DVec3::Z);
+        let start = self.vector_property(object, "p0").unwrap_or(DVec3::ZERO);
+        let end = self.vector_property(object, "p1").unwrap_or(DVec3::Z);
         let radius = self.float(object, "radius").unwrap_or(1.0);
         let is_flipped = self.boolean(object, "flip_normals", false);
         let Some(material) = self.shape_material(object, UvFlips::default()) else { return false };

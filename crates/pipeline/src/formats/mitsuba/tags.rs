@@ -17,8 +17,8 @@ pub(super) fn find_overfull_tag(text: &str) -> Option<Range<usize>> {
         position = match skipped.iter().find(|(open, _)| rest.starts_with(open)) {
             Some((_, close)) => end_of(close)?,
             None => match end_of_tag(rest.as_bytes())? {
-                TagScanOutcome::At(end) => start + end,
-                TagScanOutcome::Overfull => {
+                TagEndOrOverflow::At(end) => start + end,
+                TagEndOrOverflow::Overfull => {
                     let name = rest[1..].find(|c: char| c.is_whitespace()).unwrap_or_default();
                     return Some(start + 1..start + 1 + name);
                 }
@@ -28,7 +28,7 @@ pub(super) fn find_overfull_tag(text: &str) -> Option<Range<usize>> {
 }
 
 /// The end of a tag.
-enum TagScanOutcome {
+enum TagEndOrOverflow {
     /// Offset after the tag.
     At(usize),
     /// The tag has too many attributes.
@@ -36,16 +36,16 @@ enum TagScanOutcome {
 }
 
 /// Finds the end of a tag, which `>` marks outside of quotes.
-fn end_of_tag(tag: &[u8]) -> Option<TagScanOutcome> {
+fn end_of_tag(tag: &[u8]) -> Option<TagEndOrOverflow> {
     let (mut position, mut count) = (1, 0);
     loop {
         let at = position + tag[position..].iter().position(|byte| b">\"'".contains(byte))?;
         if tag[at] == b'>' {
-            return Some(TagScanOutcome::At(at + 1));
+            return Some(TagEndOrOverflow::At(at + 1));
         }
         count += 1;
         if count > MAX_ATTRIBUTES {
-            return Some(TagScanOutcome::Overfull);
+            return Some(TagEndOrOverflow::Overfull);
         }
         position = at + 2 + tag[at + 1..].iter().position(|byte| *byte == tag[at])?;
     }

@@ -10,7 +10,7 @@ use super::xml::truncate_for_message;
 use crate::formats::foreign::import::TableEntries;
 use crate::formats::rounding::{shorten_color, shorten_number};
 use crate::math::{DMat4, DVec3};
-use crate::scene::BuiltValue;
+use crate::scene::SceneDocumentValue;
 
 /// Purpose of a texture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -177,29 +177,29 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Returns the value of a number key that reads a texture.
-    pub(super) fn number_texture(&mut self, index: NodeIndex, uv: UvFlips) -> Option<BuiltValue> {
+    pub(super) fn number_texture(&mut self, index: NodeIndex, uv: UvFlips) -> Option<SceneDocumentValue> {
         let name = self.find_or_add_texture(index, MitsubaTextureUse::Number, uv)?;
-        Some(BuiltValue::Table(vec![("texture", name.into())]))
+        Some(SceneDocumentValue::Table(vec![("texture", name.into())]))
     }
 
     /// Returns the value of `opacity` for a texture. Selects the red channel if the image may have alpha, which
     /// `opacity` would read: Mitsuba takes the luminance, and masks are gray.
-    pub(super) fn opacity_texture(&mut self, index: NodeIndex, uv: UvFlips) -> Option<BuiltValue> {
+    pub(super) fn opacity_texture(&mut self, index: NodeIndex, uv: UvFlips) -> Option<SceneDocumentValue> {
         let name = self.find_or_add_texture(index, MitsubaTextureUse::Number, uv)?;
         let mut entries = vec![("texture", name.into())];
         if self.image_may_have_alpha(self.object_by_index(index)) {
             entries.push(("channel", "r".into()));
         }
-        Some(BuiltValue::Table(entries))
+        Some(SceneDocumentValue::Table(entries))
     }
 
     /// Returns the value of `roughness`, which is √α, for a texture of α.
-    pub(super) fn roughness_texture(&mut self, index: NodeIndex, uv: UvFlips) -> Option<BuiltValue> {
+    pub(super) fn roughness_texture(&mut self, index: NodeIndex, uv: UvFlips) -> Option<SceneDocumentValue> {
         let object = self.object_by_index(index);
         if object.plugin == "checkerboard" {
             // Convert both values exactly.
             let name = self.add_square_root_checkerboard(index, uv)?;
-            return Some(BuiltValue::Table(vec![("texture", name.into())]));
+            return Some(SceneDocumentValue::Table(vec![("texture", name.into())]));
         }
         let text = "used as √α instead of α";
         self.notes.substitute_changing_lighting("a textured `alpha`", text, object.span.clone());
@@ -207,7 +207,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Returns the value of `bump`.
-    pub(super) fn height_texture(&mut self, index: NodeIndex, uv: UvFlips) -> Option<BuiltValue> {
+    pub(super) fn height_texture(&mut self, index: NodeIndex, uv: UvFlips) -> Option<SceneDocumentValue> {
         let name = self.find_or_add_texture(index, MitsubaTextureUse::Number, uv)?;
         Some(name.into())
     }
@@ -372,7 +372,8 @@ impl<'a> SceneReader<'a> {
         uv: UvFlips,
     ) -> TableEntries {
         let colors = colors.map(shorten_color).to_vec();
-        let mut keys: TableEntries = vec![("type", "checker".into()), ("colors", BuiltValue::Array(colors))];
+        let mut keys: TableEntries =
+            vec![("type", "checker".into()), ("colors", SceneDocumentValue::Array(colors))];
         keys.extend(self.uv_keys(object, uv, false));
         keys
     }

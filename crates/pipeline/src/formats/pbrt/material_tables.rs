@@ -9,7 +9,7 @@ use super::textures::{PbrtTextureUse, texture_reference};
 use crate::formats::foreign::import::TableEntries;
 use crate::formats::rounding::shorten_color;
 use crate::math::DVec3;
-use crate::scene::BuiltValue;
+use crate::scene::SceneDocumentValue;
 use crate::scene::nearest::nearest_name;
 use crate::scene::sanitize::escape_and_truncate;
 use std::ops::Range;
@@ -166,14 +166,14 @@ impl PbrtConverter<'_> {
             [only] => Ok(table(only.clone())),
             [first, second, ..] if first == second => Ok(table(first.clone())),
             [first, second, ..] => {
-                let both = [first, second].map(|name| BuiltValue::from(name.clone())).to_vec();
+                let both = [first, second].map(|name| SceneDocumentValue::from(name.clone())).to_vec();
                 let weight = match amount.as_constant() {
                     Some(weight) => weight.x.clamp(0.0, 1.0).into(),
                     None => self.number_value(amount),
                 };
                 let keys = vec![
                     ("type", "blend".into()),
-                    ("materials", BuiltValue::Array(both)),
+                    ("materials", SceneDocumentValue::Array(both)),
                     ("weight", weight),
                 ];
                 Ok(table(self.add_material_table(keys, name, &entity.span())))
@@ -194,7 +194,7 @@ impl PbrtConverter<'_> {
                 None => shorten_color(*color),
                 Some(image) => {
                     uses_image = true;
-                    let BuiltValue::Table(mut entries) =
+                    let SceneDocumentValue::Table(mut entries) =
                         texture_reference(self.texture(image, PbrtTextureUse::Color))
                     else {
                         return true;
@@ -202,7 +202,7 @@ impl PbrtConverter<'_> {
                     if *color != DVec3::ONE {
                         entries.push(("scale", shorten_color(*color)));
                     }
-                    BuiltValue::Table(entries)
+                    SceneDocumentValue::Table(entries)
                 }
             };
             keys.push(("emission", value));

@@ -11,7 +11,7 @@ use crate::formats::foreign::import::TableEntries;
 use crate::formats::rounding::shorten_color;
 use crate::materials::conductor::elements::NamedConductor;
 use crate::math::{DVec3, Vec3};
-use crate::scene::BuiltValue;
+use crate::scene::SceneDocumentValue;
 use crate::scene::nearest::nearest_name;
 use crate::scene::sanitize::escape_and_truncate;
 use std::ops::Range;
@@ -249,7 +249,7 @@ impl MaterialReader<'_, '_> {
         self.keys.push(("ior", ior.max(1.0).into()));
         let roughness = ["roughness", "uroughness", "vroughness"];
         self.add_isotropic_roughness("roughness", roughness)?;
-        let is_smooth = self.keys.last().is_some_and(|(_, value)| *value == BuiltValue::Number(0.0));
+        let is_smooth = self.keys.last().is_some_and(|(_, value)| *value == SceneDocumentValue::Number(0.0));
         if !is_smooth {
             let text =
                 "glimt's base receives all light that the coat does not reflect, and is 2 to 5 % brighter";
@@ -434,7 +434,7 @@ impl MaterialReader<'_, '_> {
         let text = "shading darkens where the bumps are steep, by 2 % at 7 degrees";
         self.writer.notes.note("`displacement`", text, span);
         let (name, scale) = self.writer.height_texture(&node);
-        let texture = BuiltValue::Table(vec![("texture", name.into()), ("channel", "r".into())]);
+        let texture = SceneDocumentValue::Table(vec![("texture", name.into()), ("channel", "r".into())]);
         self.keys.push(("bump", texture));
         self.keys.push(("bump_scale", scale.into()));
         Ok(())

@@ -7,7 +7,7 @@ use super::texture_nodes::{ImageFilter, ImageNode, ImageWrap, TextureNode, UvMap
 use crate::formats::foreign::import::TableEntries;
 use crate::formats::rounding::shorten_color;
 use crate::math::DVec3;
-use crate::scene::BuiltValue;
+use crate::scene::SceneDocumentValue;
 
 /// How a texture's values are used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,7 +21,7 @@ pub(super) enum PbrtTextureUse {
 
 impl PbrtConverter<'_> {
     /// Returns the value of a color key: a color or a texture reference.
-    pub(super) fn color_value(&mut self, node: &TextureNode) -> BuiltValue {
+    pub(super) fn color_value(&mut self, node: &TextureNode) -> SceneDocumentValue {
         let node = &self.with_missing_images_gray(node);
         if let Some(color) = node.as_constant() {
             return shorten_color(color);
@@ -30,13 +30,13 @@ impl PbrtConverter<'_> {
     }
 
     /// Returns the value of a number key: a number or a texture reference.
-    pub(super) fn number_value(&mut self, node: &TextureNode) -> BuiltValue {
+    pub(super) fn number_value(&mut self, node: &TextureNode) -> SceneDocumentValue {
         let node = &self.with_missing_images_gray(node);
         if let Some(number) = node.as_constant() {
             return number.x.into();
         }
         let name = self.texture(node, PbrtTextureUse::Number);
-        BuiltValue::Table(vec![("texture", name.into()), ("channel", "r".into())])
+        SceneDocumentValue::Table(vec![("texture", name.into()), ("channel", "r".into())])
     }
 
     /// Replaces missing images with gray if `--missing note` tolerates them.
@@ -158,8 +158,8 @@ impl PbrtConverter<'_> {
 }
 
 /// Value of a key that references a texture.
-pub(super) fn texture_reference(name: String) -> BuiltValue {
-    BuiltValue::Table(vec![("texture", name.into())])
+pub(super) fn texture_reference(name: String) -> SceneDocumentValue {
+    SceneDocumentValue::Table(vec![("texture", name.into())])
 }
 
 /// Whether a file has an extension of a floating-point image format, whose texels are linear.
@@ -186,14 +186,17 @@ pub(super) fn push_mapping(keys: &mut TableEntries, mapping: UvMapping, cells: f
 /// Keys of a checker texture, which has two cells per repetition in glimt.
 fn checker_keys(mapping: UvMapping, colors: [DVec3; 2]) -> TableEntries {
     let colors = colors.map(|color| color.max(DVec3::ZERO)).map(shorten_color).to_vec();
-    let mut keys: TableEntries =
-        vec![("type", "checker".into()), ("colors", BuiltValue::Array(colors)), ("filter", "mipmap".into())];
+    let mut keys: TableEntries = vec![
+        ("type", "checker".into()),
+        ("colors", SceneDocumentValue::Array(colors)),
+        ("filter", "mipmap".into()),
+    ];
     push_mapping(&mut keys, mapping, 2.0);
     keys
 }
 
 /// Keys of a noise texture with values from 0 to `factor`.
 fn noise_keys(octaves: u32, factor: f64) -> TableEntries {
-    let colors = BuiltValue::Array(vec![0.0.into(), factor.abs().into()]);
+    let colors = SceneDocumentValue::Array(vec![0.0.into(), factor.abs().into()]);
     vec![("type", "noise".into()), ("colors", colors), ("octaves", f64::from(octaves).into())]
 }

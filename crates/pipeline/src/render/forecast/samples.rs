@@ -23,7 +23,7 @@ impl ExpectedSamples {
     }
 
     /// Returns the expected number of samples for a half without a goal, or [`u32::MAX`] if unknown.
-    pub(crate) fn get(&self, cell: usize, half: usize) -> u32 {
+    pub(crate) fn of_cell_half(&self, cell: usize, half: usize) -> u32 {
         self.0[cell][half]
     }
 
@@ -164,7 +164,7 @@ mod tests {
         // The first half is smooth, but the second is noisy.
         let (goals, expected) = decided_goals([(1.0, 0.0), (1.0, 1.0)], 16, 0.01);
         assert_eq!(goals.get(0, 0), u32::MAX, "no goal should be decided");
-        assert!((64..1000).contains(&expected.get(0, 0)), "{}", expected.get(0, 0));
+        assert!((64..1000).contains(&expected.of_cell_half(0, 0)), "{}", expected.of_cell_half(0, 0));
     }
 
     #[test]
@@ -175,8 +175,8 @@ mod tests {
         for (samples, expected) in [(2, 80.0), (4, 190.0), (8, 260.0)] {
             let (goals, expected_samples) = decided_goals([(1.0, 1.0); 2], samples, 0.01);
             assert_eq!(goals.get(0, 0), u32::MAX, "no goal should be decided");
-            let ratio = f64::from(expected_samples.get(0, 0)) / expected;
-            assert!((0.6..1.6).contains(&ratio), "{samples}: {}", expected_samples.get(0, 0));
+            let ratio = f64::from(expected_samples.of_cell_half(0, 0)) / expected;
+            assert!((0.6..1.6).contains(&ratio), "{samples}: {}", expected_samples.of_cell_half(0, 0));
         }
     }
 
@@ -214,7 +214,7 @@ mod tests {
     fn huge_predictions_differ_from_unknown() {
         for samples in [2, 16, 64] {
             let (goals, expected) = decided_goals([(1.0, 1.0); 2], samples, 1e-12);
-            assert_eq!((goals.get(0, 0), expected.get(0, 0)), (u32::MAX, MAX_SAMPLES), "{samples}");
+            assert_eq!((goals.get(0, 0), expected.of_cell_half(0, 0)), (u32::MAX, MAX_SAMPLES), "{samples}");
         }
     }
 

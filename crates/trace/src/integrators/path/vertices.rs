@@ -82,7 +82,7 @@ impl CameraPathWavefront<'_, '_> {
         let (tile, place) = (self.tile, self.place);
         let shading = vertex.perturbed_and_smooth_normals(self.counters);
         let behind = bsdf.bsdf_for_transmitted_light().map(|bsdf| (bsdf, shading.seen_from_far_side()));
-        let aov = self.select_light_aov_for_path(path);
+        let aov = self.light_aov_at_vertex_of_path(path);
         let lit = ShadingVertex { path, interiors: &path.interiors, place, vertex, shading, bsdf };
         self.direct.push(tile, &lit, aov, ShadingSides::OneSide { is_dark: false });
         // Transmitted light has its own vertex, except for the lit fraction, which is measured on the
@@ -110,7 +110,7 @@ impl CameraPathWavefront<'_, '_> {
         }
         let (tile, place) = (self.tile, self.place);
         let shading = vertex.perturbed_and_smooth_normals(self.counters);
-        let aov = self.select_light_aov_for_path(path);
+        let aov = self.light_aov_at_vertex_of_path(path);
         let near = &path.interiors;
         let (reflection, transmission) = (rough.reflection_bxdf(), rough.transmission_bxdf());
         // The lit fraction is measured on the viewer's side. Blocked light is included, so a dark side is
@@ -148,7 +148,7 @@ impl CameraPathWavefront<'_, '_> {
     }
 
     /// The light AOV at a path's vertex. After the first non-specular surface, all light is included.
-    pub(super) fn select_light_aov_for_path(&self, path: &PathRay) -> PathAov {
+    pub(super) fn light_aov_at_vertex_of_path(&self, path: &PathRay) -> PathAov {
         if path.state.only_specular_before { self.accumulator.aov } else { PathAov::ALL }
     }
 }

@@ -32,16 +32,16 @@ struct OffReader<'a> {
     source: MeshFileBytes<'a>,
     cursor: Cursor<'a>,
     /// Lines with numbers that the header does not declare.
-    excess: LineCountAndFirstOffset,
+    excess: LinesToWarnAbout,
     /// Lines whose color is an index into a colormap.
-    indices: LineCountAndFirstOffset,
+    indices: LinesToWarnAbout,
 }
 
 /// Lines to warn about: their number and the byte offset of the first one.
 #[derive(Clone, Copy, Default)]
-struct LineCountAndFirstOffset(u64, usize);
+struct LinesToWarnAbout(u64, usize);
 
-impl LineCountAndFirstOffset {
+impl LinesToWarnAbout {
     fn add_line_at_offset(&mut self, at: usize) {
         self.1 = if self.0 == 0 { at } else { self.1 };
         self.0 += 1;

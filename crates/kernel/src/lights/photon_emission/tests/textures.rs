@@ -35,7 +35,7 @@ fn textured(light: AreaLight, texture: &Arc<Texture>, chart: UvMapping) -> Light
 #[test]
 fn textured_emission_matches_light_sampling() {
     for shape in shapes() {
-        let light = front_area_light(&shape, COLOR, OBJECT).expect("an area");
+        let light = new_front_area_light(&shape, COLOR, OBJECT).expect("an area");
         let light =
             textured(light, &texture(16, 8, TextureFilter::Bilinear), UvMapping::Shape(shape.clone()));
         let source = source_of(light.clone(), Some(&shape));
@@ -53,7 +53,7 @@ fn textured_emission_matches_light_sampling() {
 #[test]
 fn quad_power_is_the_mean_of_its_texture() {
     let (shape, texels) = (shapes()[1].clone(), patchy(32, 16));
-    let light = front_area_light(&shape, COLOR, OBJECT).expect("an area");
+    let light = new_front_area_light(&shape, COLOR, OBJECT).expect("an area");
     let light = textured(light, &texture(32, 16, TextureFilter::Nearest), UvMapping::Shape(shape.clone()));
     let exact = texels.mean().as_dvec3() * COLOR.as_dvec3() * PI * shape.local_part_areas()[0];
     let source = source_of(light, Some(&shape));

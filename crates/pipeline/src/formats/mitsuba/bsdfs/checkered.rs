@@ -6,7 +6,7 @@ use crate::formats::mitsuba::graph::PluginInstance;
 use crate::formats::mitsuba::reader::{NumberSource, SceneReader, luminance};
 use crate::formats::rounding::shorten_number;
 use crate::math::{DMat4, DVec3};
-use crate::scene::BuiltValue;
+use crate::scene::SceneDocumentValue;
 
 /// The values of α along u and v in the two kinds of cells of a checkerboard, from the cell at (0, 0).
 type CellAlphas = [[f64; 2]; 2];
@@ -100,10 +100,10 @@ impl<'a> SceneReader<'a> {
             metal.is_one_sided &= !context.is_two_sided;
             self.add_enclosing_keys(&mut metal, context);
             let wanted = object.id.as_deref().unwrap_or(&object.plugin);
-            names.push(BuiltValue::from(self.add_material(metal, wanted, object.span.clone())));
+            names.push(SceneDocumentValue::from(self.add_material(metal, wanted, object.span.clone())));
         }
-        let weight = BuiltValue::Table(vec![("texture", weight.into())]);
-        let keys = vec![("materials", BuiltValue::Array(names)), ("weight", weight)];
+        let weight = SceneDocumentValue::Table(vec![("texture", weight.into())]);
+        let keys = vec![("materials", SceneDocumentValue::Array(names)), ("weight", weight)];
         Some(MaterialBuilder { is_blend: true, ..MaterialBuilder::new("blend", keys) })
     }
 }

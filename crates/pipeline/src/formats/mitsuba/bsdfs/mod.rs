@@ -11,7 +11,7 @@ use super::textures::MitsubaTextureUse;
 use crate::formats::foreign::import::TableEntries;
 use crate::formats::rounding::{shorten_color, shorten_number};
 use crate::math::DVec3;
-use crate::scene::BuiltValue;
+use crate::scene::SceneDocumentValue;
 
 /// Index of refraction of air, Mitsuba's default exterior.
 const AIR: f64 = 1.000_277;
@@ -190,7 +190,9 @@ impl<'a> SceneReader<'a> {
             ColorSource::Texture(texture) => {
                 match self.find_or_add_texture(texture, MitsubaTextureUse::Color, uv) {
                     Some(name) => {
-                        builder.keys.push(("emission", BuiltValue::Table(vec![("texture", name.into())])));
+                        builder
+                            .keys
+                            .push(("emission", SceneDocumentValue::Table(vec![("texture", name.into())])));
                     }
                     None => {
                         let color = self.color_if_spectrum(texture, ColorRole::Emission);
@@ -289,18 +291,18 @@ impl<'a> SceneReader<'a> {
         name: &str,
         default: f64,
         context: BsdfContext,
-    ) -> BuiltValue {
+    ) -> SceneDocumentValue {
         let color = self.color_or_texture(object, name, ColorRole::Reflectance, default);
         self.color_value(color, context, 1.0)
     }
 
     /// Converts a color or texture to the value of a color key, times `factor`.
-    fn color_value(&mut self, color: ColorSource, context: BsdfContext, factor: f64) -> BuiltValue {
+    fn color_value(&mut self, color: ColorSource, context: BsdfContext, factor: f64) -> SceneDocumentValue {
         match color {
             ColorSource::Constant(color) => shorten_color(color * factor),
             ColorSource::Texture(texture) => {
                 match self.find_or_add_scaled_texture(texture, MitsubaTextureUse::Color, context.uv, factor) {
-                    Some(name) => BuiltValue::Table(vec![("texture", name.into())]),
+                    Some(name) => SceneDocumentValue::Table(vec![("texture", name.into())]),
                     None => {
                         let color = self.color_if_spectrum(texture, ColorRole::Reflectance);
                         shorten_color(color.unwrap_or(DVec3::splat(0.5)) * factor)
@@ -311,12 +313,16 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Converts a number or texture to the value of a number key.
-    fn value_from_number_source(&mut self, number: NumberSource, context: BsdfContext) -> BuiltValue {
+    fn value_from_number_source(&mut self, number: NumberSource, context: BsdfContext) -> SceneDocumentValue {
         self.value_from_number_or_texture(number, context, Self::number_texture)
     }
 
     /// Converts a number or texture to the value of `opacity`.
-    fn opacity_from_number_source(&mut self, number: NumberSource, context: BsdfContext) -> BuiltValue {
+    fn opacity_from_number_source(
+        &mut self,
+        number: NumberSource,
+        context: BsdfContext,
+    ) -> SceneDocumentValue {
         self.value_from_number_or_texture(number, context, Self::opacity_texture)
     }
 
@@ -324,8 +330,8 @@ impl<'a> SceneReader<'a> {
         &mut self,
         number: NumberSource,
         context: BsdfContext,
-        convert_texture: impl FnOnce(&mut Self, NodeIndex, UvFlips) -> Option<BuiltValue>,
-    ) -> BuiltValue {
+        convert_texture: impl FnOnce(&mut Self, NodeIndex, UvFlips) -> Option<SceneDocumentValue>,
+    ) -> SceneDocumentValue {
         match number {
             NumberSource::Constant(number) => shorten_number(number.clamp(0.0, 1.0)).into(),
             NumberSource::Texture(texture) => match convert_texture(self, texture, context.uv) {

@@ -10,7 +10,7 @@ use crate::formats::mitsuba::textures::MitsubaTextureUse;
 use crate::formats::mitsuba::xml::truncate_for_message;
 use crate::formats::rounding::{shorten_color, shorten_number};
 use crate::math::DVec3;
-use crate::scene::BuiltValue;
+use crate::scene::SceneDocumentValue;
 
 impl<'a> SceneReader<'a> {
     /// Returns the first nested BSDF, or reports an error.
@@ -96,9 +96,9 @@ impl<'a> SceneReader<'a> {
         let weight = self.value_from_number_source(weight, context);
         let mut names = Vec::new();
         for child in [first, second] {
-            names.push(BuiltValue::from(self.blend_part(object, child, context)?));
+            names.push(SceneDocumentValue::from(self.blend_part(object, child, context)?));
         }
-        let keys = vec![("materials", BuiltValue::Array(names)), ("weight", weight)];
+        let keys = vec![("materials", SceneDocumentValue::Array(names)), ("weight", weight)];
         Some(MaterialBuilder { is_blend: true, ..MaterialBuilder::new("blend", keys) })
     }
 

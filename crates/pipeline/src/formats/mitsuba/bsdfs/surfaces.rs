@@ -14,7 +14,7 @@ use crate::formats::mitsuba::xml::truncate_for_message;
 use crate::formats::rounding::{shorten_color, shorten_number, shorten_vector};
 use crate::materials::conductor::elements::NamedConductor;
 use crate::math::DVec3;
-use crate::scene::BuiltValue;
+use crate::scene::SceneDocumentValue;
 use crate::scene::nearest::nearest_name;
 
 impl<'a> SceneReader<'a> {
@@ -136,7 +136,7 @@ impl<'a> SceneReader<'a> {
         alpha: NumberSource,
         object: &'a PluginInstance,
         context: BsdfContext,
-    ) -> BuiltValue {
+    ) -> SceneDocumentValue {
         match alpha {
             // Mitsuba clamps α to at least 1e-4.
             NumberSource::Constant(alpha) => shorten_number(libm::sqrt(alpha.clamp(1e-4, 1.0))).into(),
@@ -279,7 +279,7 @@ impl<'a> SceneReader<'a> {
                 name
             }
         };
-        let materials = BuiltValue::Array(vec![black.into(), metal.into()]);
+        let materials = SceneDocumentValue::Array(vec![black.into(), metal.into()]);
         let keys = vec![("materials", materials), ("weight", weight)];
         MaterialBuilder { is_blend: true, ..MaterialBuilder::new("blend", keys) }
     }

@@ -76,7 +76,7 @@ impl<'a> PathStepper<'a> for PhotonWavefront<'a> {
         }
         let shading = vertex.perturbed_and_smooth_normals(&mut self.counters);
         let ray = reflected_path(path, vertex, &shading, Vec3::ONE);
-        self.queue_specular_photon(path, vertex, (shading.normal, 1.0), ray);
+        self.queue_after_specular_bounce(path, vertex, (shading.normal, 1.0), ray);
         NullInteractionOutcome::Ended
     }
 }
@@ -104,7 +104,7 @@ impl PhotonWavefront<'_> {
                 let shading = vertex.perturbed_and_smooth_normals(&mut self.counters);
                 let reflectance = vertex.mirror_reflectance(mirror, &shading, true, &mut self.counters);
                 let ray = reflected_path(path, vertex, &shading, reflectance);
-                self.queue_specular_photon(path, vertex, (shading.normal, 1.0), ray);
+                self.queue_after_specular_bounce(path, vertex, (shading.normal, 1.0), ray);
             }
             Bsdf::Mirror(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Blend(_) => {}
         }
@@ -133,7 +133,7 @@ impl PhotonWavefront<'_> {
             let specular = vertex.specular_sample_weight(layers, &lobe, &mut self.counters);
             let part = if chooses { 1.0 } else { probability };
             let ray = reflected_path(path, vertex, &shading, specular * part);
-            self.queue_specular_photon(path, vertex, (shading.normal, 1.0), ray);
+            self.queue_after_specular_bounce(path, vertex, (shading.normal, 1.0), ray);
         }
     }
 
@@ -152,13 +152,13 @@ impl PhotonWavefront<'_> {
             self.store_and_scatter(path, vertex, bsdf, (far, scattered));
         } else if vertex.is_blended() {
             // The photon may be reflected by another part of the blend.
-            self.store_at_vertex(path, vertex);
+            self.store_rescaled_photon(path, vertex);
         }
     }
 
     /// Stores a photon at a vertex. Its flux is scaled up to account for photons that passed through the surface
     /// as a null interaction, or that chose a part of a blend on which no photons are stored.
-    fn store_at_vertex(&mut self, path: &PathRay, vertex: &SurfaceVertex<'_>) {
+    fn store_rescaled_photon(&mut self, path: &PathRay, vertex: &SurfaceVertex<'_>) {
         let chance = storage_probability(path, vertex, &mut self.counters.texture_lookups);
         let all = PathRay { throughput: path.throughput / chance, ..*path };
         self.store_photon(&all, vertex.surface.point, vertex.normal);
@@ -173,7 +173,7 @@ impl PhotonWavefront<'_> {
         (far, scattered): (&InteriorList, Option<f32>),
     ) {
         let tile = self.tracing.tile;
-        self.store_at_vertex(path, vertex);
+        self.store_rescaled_photon(path, vertex);
         let Some(factor) = scattered.filter(|_| path.state.only_specular_before && self.is_below_max_depth())
         else {
             return;
@@ -229,11 +229,11 @@ impl PhotonWavefront<'_> {
             Some(mut ray) if !tile.chooses_reflection(path, reflectance) => {
                 let eta = medium_ior(tile.world, far) / medium_ior(tile.world, &path.interiors);
                 ray.throughput *= 1.0 / (eta * eta);
-                self.queue_specular_photon(path, vertex, (shading.normal, eta), ray);
+                self.queue_after_specular_bounce(path, vertex, (shading.normal, eta), ray);
             }
             Some(_) | None => {
                 let ray = reflected_path(path, vertex, &shading, Vec3::ONE);
-                self.queue_specular_photon(path, vertex, (shading.normal, 1.0), ray);
+                self.queue_after_specular_bounce(path, vertex, (shading.normal, 1.0), ray);
             }
         }
     }
@@ -241,7 +241,7 @@ impl PhotonWavefront<'_> {
     /// Queues a photon after a specular bounce. If the shading normal differs from the geometric normal, the
     /// photon is weighted by the adjoint BSDF (see [`emit`](super)). `eta` is the index of
     /// refraction on the far side relative to the near side.
-    fn queue_specular_photon(
+    fn queue_after_specular_bounce(
         &mut self,
         path: &PathRay,
         vertex: &SurfaceVertex<'_>,
