@@ -103,9 +103,8 @@ fn hemisphere_irradiance(build: &Build) -> f64 {
             let surface = world.geometry.surface(&ray, &hit);
             if surface.normal.dot(ray.direction) < 0.0 {
                 let emission = &world.materials[world.material_index(&hit)].emission;
-                sum += f64::from(
-                    emission.radiance_of_emitting_side(&TexturePoint::from_uv(surface.uv), 1.0, &mut 0).x,
-                );
+                sum +=
+                    f64::from(emission.radiance_at_cosine(&TexturePoint::from_uv(surface.uv), 1.0, &mut 0).x);
             }
         }
     }

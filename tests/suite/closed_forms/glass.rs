@@ -3,7 +3,7 @@
 use glimt::geometry::Ray;
 use glimt::geometry::mesh::TriangleMesh;
 use glimt::geometry::ray::offset_origin;
-use glimt::materials::fresnel::{dielectric, refract_given_transmitted_cosine};
+use glimt::materials::fresnel::{fresnel_dielectric, refract_given_transmitted_cosine};
 use glimt::math::random::TestRandom;
 use glimt::math::{DVec3, Vec3};
 use glimt::scene::description::{EmissionSource, Material, MeshReference, Shape};
@@ -100,7 +100,7 @@ fn exit_ray(geometry: &Geometry, mut ray: Ray) -> Option<Ray> {
         let surface = geometry.surface(&ray, &hit);
         let entering = surface.normal.dot(ray.direction) < 0.0;
         let (normal, eta) = if entering { (surface.normal, 1.5) } else { (-surface.normal, 1.0 / 1.5) };
-        let (_, cosine) = dielectric(-normal.dot(ray.direction), eta);
+        let (_, cosine) = fresnel_dielectric(-normal.dot(ray.direction), eta);
         let direction = refract_given_transmitted_cosine(ray.direction, normal, eta, cosine?);
         ray = Ray::new(offset_origin(surface.point, surface.error, surface.normal, direction), direction);
     }
@@ -349,7 +349,7 @@ fn shading_normals_create_no_light() {
         let ray = Ray::new(eye, direction);
         let hit = geometry.closest_hit(&ray).expect("inside a closed mesh");
         let surface = geometry.surface(&ray, &hit);
-        let (_, cosine) = dielectric(surface.shading_normal.dot(direction), 1.0 / 1.5);
+        let (_, cosine) = fresnel_dielectric(surface.shading_normal.dot(direction), 1.0 / 1.5);
         let refracted = cosine
             .map(|c| refract_given_transmitted_cosine(direction, -surface.shading_normal, 1.0 / 1.5, c));
         if refracted.is_none_or(|refracted| refracted.dot(surface.normal) > 0.0) {

@@ -44,7 +44,7 @@ fn noise_color(noise: &Noise, position: DVec3) -> DVec3 {
     let object = ObjectPoint { position, width: 0.0, from_world: DMat3::IDENTITY };
     let extra = Some(Box::new(ExtraCoordinates { second: None, object: Some(object) }));
     let at = TexturePoint { extra, ..TexturePoint::from_uv(DVec2::ZERO) };
-    let share = f64::from(0.5 + 0.5 * noise.filtered(&at, false).value);
+    let share = f64::from(0.5 + 0.5 * noise.evaluate(&at, false).value);
     RED.as_dvec3() * (1.0 - share) + BLUE.as_dvec3() * share
 }
 

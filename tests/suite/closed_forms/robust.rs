@@ -8,7 +8,7 @@ use glimt::geometry::ray::offset_origin;
 use glimt::geometry::{Ray, SurfacePoint};
 use glimt::integrators::render_tile;
 use glimt::lights::GeometryOfLight;
-use glimt::materials::fresnel::dielectric;
+use glimt::materials::fresnel::fresnel_dielectric;
 use glimt::math::random::TestRandom;
 use glimt::math::transform::Transform;
 use glimt::math::{DVec3, Vec3};
@@ -453,7 +453,7 @@ fn fresnel_matches_double_precision() {
     for _ in 0..100_000 {
         let cosine = 10.0_f64.powf(-6.0 * random.unit()) as f32;
         let eta = [1.0, 1.0001, 1.0 / 1.0001, 1.5, 1.0 / 1.5, 2.4, 1.0 / 2.4][(random.unit() * 7.0) as usize];
-        let (reflectance, transmitted) = dielectric(cosine, eta);
+        let (reflectance, transmitted) = fresnel_dielectric(cosine, eta);
         let (c, n) = (f64::from(cosine), f64::from(eta));
         let cos2 = 1.0 - (1.0 - c * c) / (n * n);
         let exact = if cos2 <= 0.0 {

@@ -1,7 +1,7 @@
 //! The [`Light`] enum. [`Light::family`] returns a light as its family's trait object.
 
 use super::area::{AreaLight, EmissionModulation};
-use super::delta::{DeltaLight, PointLight, SpotLight};
+use super::delta::{DeltaPositionLight, PointLight, SpotLight};
 use super::infinite::{DirectionalLight, Environment, InfiniteLight};
 use super::packet::LightSamplePacket;
 use super::sample::{GeometryOfLight, LightCenter, LightHitPoint, LightSample};
@@ -30,7 +30,7 @@ pub enum Light {
 #[derive(Clone, Copy)]
 pub enum LightFamily<'a> {
     /// A light without extent.
-    Delta(&'a dyn DeltaLight),
+    Delta(&'a dyn DeltaPositionLight),
     /// A light at infinity.
     Infinite(&'a dyn InfiniteLight),
     /// An emitting surface.
@@ -123,7 +123,7 @@ impl Light {
     /// Light-sampling pdf of a hit's direction in sr⁻¹, for the surface point `from` with the given normal.
     /// It is 0 if light sampling never generates the direction, or if rays cannot hit the light.
     #[inline]
-    pub fn pdf(&self, from: Vec3, normal: Vec3, hit: &LightHitPoint) -> f32 {
+    pub fn pdf_of_hit(&self, from: Vec3, normal: Vec3, hit: &LightHitPoint) -> f32 {
         self.as_area().map_or(0.0, |light| light.pdf(from, normal, hit))
     }
 
@@ -155,7 +155,7 @@ impl Light {
     }
 
     /// Whether light arrives from a single direction.
-    pub fn is_single_direction(&self) -> bool {
+    pub fn has_no_angular_extent(&self) -> bool {
         match self.family() {
             LightFamily::Delta(_) => true,
             LightFamily::Infinite(light) => light.is_single_direction(),

@@ -16,7 +16,7 @@
 //! # To add a light
 //!
 //! 1. In `delta/NAME.rs` or `infinite/NAME.rs`, add a struct that implements
-//!    [`DeltaLight`](delta::DeltaLight) or [`InfiniteLight`](infinite::InfiniteLight). An emitting shape
+//!    [`DeltaPositionLight`](delta::DeltaPositionLight) or [`InfiniteLight`](infinite::InfiniteLight). An emitting shape
 //!    implements [`ShapeEmitter`](area::ShapeEmitter) in `area/NAME.rs`, see [`area`].
 //! 2. In the folder's `mod.rs`, declare the module and re-export the struct.
 //! 3. In `light.rs`, add a variant and the match arms required by the compiler, for its family, sampling, and
@@ -30,7 +30,7 @@
 //! - The weight of a sample is the radiance divided by the pdf of its direction. For a delta light, it is the
 //!   irradiance.
 //! - The pdf of a sampled direction ([`Light::inverse_pdfs_of_samples`]) equals its pdf when a ray hits the
-//!   light ([`Light::pdf`], or [`Lights::radiance_from_infinity`] for infinite lights).
+//!   light ([`Light::pdf_of_hit`], or [`Lights::radiance_from_infinity`] for infinite lights).
 //! - The mean photon flux equals the power implied by the bounds and the samples.
 
 pub mod area;

@@ -5,7 +5,7 @@ use super::area::packet::triangle_packet_of;
 use super::area::quad::QuadEmitter;
 use super::area::sphere::SphereEmitter;
 use super::area::{AreaLight, SampledLightPoint, ShapeEmitter};
-use super::delta::DeltaLight;
+use super::delta::DeltaPositionLight;
 use super::packet::{LightSamplePacket, packet_of};
 use super::sample::GeometryOfLight;
 use super::{Light, Lights};

@@ -68,7 +68,7 @@ impl LightSamplingEffort {
 
     /// Creates a cut through a tree for this effort.
     #[inline(always)]
-    pub fn adaptive_tree_cut(self, tree: &LightTree) -> AdaptiveLightTreeCut<'_> {
+    pub fn new_adaptive_tree_cut(self, tree: &LightTree) -> AdaptiveLightTreeCut<'_> {
         AdaptiveLightTreeCut::new(tree, self.nodes)
     }
 }
@@ -164,13 +164,13 @@ impl Lights {
         let Some(sampler) = self.sampler_for_purpose(receivers) else {
             return ExpectedSamplesPerLight(None);
         };
-        let mut cut = sampler.picks.adaptive_tree_cut(sampler.tree);
+        let mut cut = sampler.picks.new_adaptive_tree_cut(sampler.tree);
         cut.adapt_to_receiver(&Receiver::with_unknown_lobe(point, normal));
         ExpectedSamplesPerLight(Some((sampler, cut)))
     }
 
     /// Memory used by the trees over lights and over the triangles of mesh lights, in bytes.
-    pub fn tree_memory_bytes(&self) -> usize {
+    pub fn light_trees_memory_bytes(&self) -> usize {
         let of_mesh = |light: &Light| {
             let mesh = light.as_area().and_then(|light| light.shape.as_mesh());
             mesh.and_then(MeshEmitter::light_tree).map_or(0, LightTree::memory_bytes)
@@ -222,7 +222,7 @@ impl Lights {
 
     /// Whether rays can hit a light.
     pub fn can_be_hit(&self) -> bool {
-        !self.by_object.is_empty() || self.has_visible_infinite_lights()
+        !self.by_object.is_empty() || self.escaping_rays_can_hit_light()
     }
 
     /// Whether any part of an object emits.
@@ -237,7 +237,7 @@ impl Lights {
     }
 
     /// Whether rays that leave the scene may reach a light.
-    pub fn has_visible_infinite_lights(&self) -> bool {
+    pub fn escaping_rays_can_hit_light(&self) -> bool {
         !self.suns.is_empty() || self.environment.is_some()
     }
 

@@ -170,7 +170,7 @@ fn sample_pdf_equals_pdf_of_hit() {
                         .light_on_primitive(OBJECT, hit.primitive, Side::Front)
                         .expect("expected a light");
                     assert_eq!(found, number, "{shape:?}");
-                    let product = light_at.pdf(from, Vec3::Y, &light_hit) * factor;
+                    let product = light_at.pdf_of_hit(from, Vec3::Y, &light_hit) * factor;
                     assert!((product - 1.0).abs() < 2e-3, "{shape:?} {from}: {product}");
                     compared += 1;
                 }
@@ -216,7 +216,7 @@ fn two_sided_samples_cover_the_visible_shape() {
                 };
                 let part = f64::from(around.solid_angle()) / f64::from(n);
                 seen += part;
-                sum += if light.pdf(from, Vec3::Y, &light_hit) > 0.0 { part } else { 0.0 };
+                sum += if light.pdf_of_hit(from, Vec3::Y, &light_hit) > 0.0 { part } else { 0.0 };
             }
             assert!(
                 (sum - seen).abs() <= 1e-3 * seen,
@@ -253,7 +253,7 @@ fn back_sample_pdf_equals_pdf_of_hit() {
                     continue;
                 }
                 assert!(light_hit.normal.dot(direction) > 0.0, "{shape:?}: a sample is on the front");
-                let product = light.pdf(from, Vec3::Y, &light_hit) * factor;
+                let product = light.pdf_of_hit(from, Vec3::Y, &light_hit) * factor;
                 assert!((product - 1.0).abs() < 2e-3, "{shape:?} {from}: {product}");
                 compared += 1;
             }
@@ -277,7 +277,8 @@ fn pdfs_integrate_to_one_over_the_light() {
                     continue;
                 };
                 sums[number as usize] +=
-                    f64::from(light.pdf(from, Vec3::Y, &light_hit) * cone.solid_angle()) / f64::from(n);
+                    f64::from(light.pdf_of_hit(from, Vec3::Y, &light_hit) * cone.solid_angle())
+                        / f64::from(n);
             }
             for (sum, (number, light)) in sums.iter().zip(lights.iter()).skip(1) {
                 let all = samples(light, number, from, 1024);
@@ -359,13 +360,13 @@ fn mesh_triangles_map_to_their_lights() {
     let light_hit = LightHitPoint { direction: Vec3::NEG_Z, distance: 2.0, normal: Vec3::Z, primitive: 2 };
     let (_, light) = lights.light_on_primitive(3, 2, Side::Front).expect("a light");
     // d²/(A·cos) = 4/½.
-    assert!((light.pdf(Vec3::ZERO, Vec3::Z, &light_hit) - 8.0).abs() < 1e-5);
+    assert!((light.pdf_of_hit(Vec3::ZERO, Vec3::Z, &light_hit) - 8.0).abs() < 1e-5);
     assert_eq!(
-        light.pdf(Vec3::ZERO, Vec3::Z, &LightHitPoint { normal: Vec3::NEG_Z, ..light_hit }),
+        light.pdf_of_hit(Vec3::ZERO, Vec3::Z, &LightHitPoint { normal: Vec3::NEG_Z, ..light_hit }),
         0.0,
         "from behind"
     );
-    assert_eq!(Light::Point(POINT).pdf(Vec3::ONE, Vec3::Z, &light_hit), 0.0);
+    assert_eq!(Light::Point(POINT).pdf_of_hit(Vec3::ONE, Vec3::Z, &light_hit), 0.0);
 }
 
 /// A mesh light with the given triangles. Their primitive indices start at 5.

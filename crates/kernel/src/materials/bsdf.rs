@@ -82,13 +82,13 @@ impl BsdfValuePacket {
     /// Fractions of [`BsdfValuePacket::f`] from wide lobes, or 0 where f is 0.
     #[inline(never)]
     pub fn wide_fraction(&self) -> Vec3x16 {
-        ratio(&self.wide, &self.f())
+        divide_lanes_or_zero(&self.wide, &self.f())
     }
 }
 
 /// Returns a/b in each lane, or 0 where b is 0.
 #[inline(always)]
-pub fn ratio(a: &Vec3x16, b: &Vec3x16) -> Vec3x16 {
+pub fn divide_lanes_or_zero(a: &Vec3x16, b: &Vec3x16) -> Vec3x16 {
     let mut ratio = *a;
     for axis in 0..3 {
         for i in 0..PACKET_SIZE {
@@ -197,7 +197,7 @@ pub trait BxdfParameters {
     /// Reflectances of the wide and the narrow lobes for light that a coat reflects back down. 0 neglects
     /// this light.
     #[inline(always)]
-    fn lobe_reflectances_under_coat(&self) -> [Vec3; 2] {
+    fn interreflection_reflectances(&self) -> [Vec3; 2] {
         [Vec3::ZERO; 2]
     }
 }

@@ -108,7 +108,7 @@ impl<B: Bxdf> BxdfPacket<B> {
     /// in `of` or for all lanes. Replaces `normals` with the normals rotated by
     /// [`lobe_shading_normal`](super::bxdf::lobe_shading_normal).
     #[inline(always)]
-    pub fn set_normals_and_directions(
+    pub fn set_normals_and_ray_directions(
         &mut self,
         of: Option<&Mask>,
         normals: &mut Vec3x16,
@@ -295,7 +295,7 @@ impl<B: Bxdf> BxdfPacket<B> {
     /// Mask of the surfaces in `of` whose narrow lobe is at least as narrow as a cosine raised to the power
     /// `exponent`.
     #[inline(always)]
-    pub fn mask_narrower_than(&self, of: u32, exponent: f32) -> u32 {
+    pub fn mask_of_lanes_narrower_than(&self, of: u32, exponent: f32) -> u32 {
         let mut narrow = 0;
         for i in 0..PACKET_SIZE {
             narrow |= u32::from(B::get(&self.bsdf, i).narrow_lobe_exponent() >= exponent) << i;

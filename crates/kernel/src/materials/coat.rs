@@ -15,7 +15,7 @@
 //! of the returned light is neglected, and principled materials neglect the returned light altogether.
 
 use super::footprint::TexturePoint;
-use super::fresnel::{dielectric_from_outside, schlick_weight};
+use super::fresnel::{fresnel_dielectric_from_outside, schlick_weight};
 use super::lobe_albedo::{LobeAlbedoPolynomial, TERMS, evaluate_albedo_fit};
 use super::lookup::{MaterialTextureCollector, ParameterLookup, PointTextureEvaluator};
 use super::microfacet::{
@@ -109,8 +109,9 @@ impl Coat {
     /// Transmittance t for light that leaves the layer below at the given cosine. Counts texture lookups in
     /// `lookups`.
     pub fn transmittance(&self, at: &TexturePoint, cosine: f32, lookups: &mut u64) -> Vec3 {
-        let layer =
-            ClearCoatLayer::from(&self.look_up_parameters(&mut PointTextureEvaluator { point: at, lookups }));
+        let layer = SchlickCoatLayer::from(
+            &self.look_up_parameters(&mut PointTextureEvaluator { point: at, lookups }),
+        );
         let cosine = cosine.abs();
         layer.absorption_transmittance(layer.path_length(cosine)) * (1.0 - layer.albedo(cosine))
     }
@@ -124,8 +125,9 @@ impl Coat {
         base: Vec3,
         lookups: &mut u64,
     ) -> Vec3 {
-        let layer =
-            ClearCoatLayer::from(&self.look_up_parameters(&mut PointTextureEvaluator { point: at, lookups }));
+        let layer = SchlickCoatLayer::from(
+            &self.look_up_parameters(&mut PointTextureEvaluator { point: at, lookups }),
+        );
         let albedo = layer.albedo(cosine);
         let passed = (1.0 - albedo) * (1.0 - albedo);
         let absorbed = layer.absorption_transmittance(2.0 * layer.path_length(cosine));
@@ -161,9 +163,9 @@ pub fn interreflection_gain(base: Vec3, coat: f32) -> Vec3 {
 }
 
 /// The layer of a clear coat.
-pub type ClearCoatLayer = CoatLayer<false, false>;
+pub type SchlickCoatLayer = CoatLayer<false, false>;
 
-impl From<&CoatPoint> for ClearCoatLayer {
+impl From<&CoatPoint> for SchlickCoatLayer {
     #[inline(always)]
     fn from(point: &CoatPoint) -> Self {
         let &CoatPoint { weight, alpha, reflectance, ior, extinction, albedo } = point;
@@ -190,7 +192,7 @@ impl<const EXACT: bool, const BECKMANN: bool> CoatLayer<EXACT, BECKMANN> {
     #[inline(always)]
     pub fn fresnel(&self, cosine: f32) -> f32 {
         if EXACT {
-            dielectric_from_outside(cosine, self.ior)
+            fresnel_dielectric_from_outside(cosine, self.ior)
         } else {
             self.reflectance + (1.0 - self.reflectance) * schlick_weight(cosine)
         }

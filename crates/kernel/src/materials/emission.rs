@@ -63,7 +63,7 @@ impl Emission {
     /// The radiance at the given texture coordinates, in a direction at the given cosine to the normal.
     /// Counts texture lookups in `lookups`.
     #[inline]
-    pub fn radiance_of_emitting_side(&self, at: &TexturePoint, cosine: f32, lookups: &mut u64) -> Vec3 {
+    pub fn radiance_at_cosine(&self, at: &TexturePoint, cosine: f32, lookups: &mut u64) -> Vec3 {
         let left = self.coat.as_ref().map_or(Vec3::ONE, |coat| coat.transmittance(at, cosine, lookups));
         let Some(texture) = self.texture.as_ref().filter(|_| self.is_emissive()) else {
             return self.scale * left;

@@ -7,7 +7,7 @@ use crate::math::Vec3;
 /// `eta` is n(far side)/n(ray's side). Uses the exact equations for both polarizations (Born and Wolf,
 /// *Principles of Optics*, section 1.5.2).
 #[inline]
-pub fn dielectric(cos_incident: f32, eta: f32) -> (f32, Option<f32>) {
+pub fn fresnel_dielectric(cos_incident: f32, eta: f32) -> (f32, Option<f32>) {
     let (cos_i, eta) = (f64::from(cos_incident.clamp(0.0, 1.0)), f64::from(eta));
     // Compute 1 − sin²θₜ without cancellation at grazing angles.
     let cos2_t = ((eta - 1.0) * (eta + 1.0) + cos_i * cos_i) / (eta * eta);
@@ -20,27 +20,23 @@ pub fn dielectric(cos_incident: f32, eta: f32) -> (f32, Option<f32>) {
     ((0.5 * (parallel * parallel + perpendicular * perpendicular)) as f32, Some(cos_t as f32))
 }
 
-/// [`dielectric`] for light from outside (`eta` ≥ 1), in `f32` for packets.
+/// [`fresnel_dielectric`] for light from outside (`eta` ≥ 1), in `f32` for packets.
 #[inline(always)]
-pub fn dielectric_from_outside(cos_incident: f32, eta: f32) -> f32 {
-    dielectric_from_eta2_transmitted_cos2(
-        cos_incident,
-        eta,
-        (eta - 1.0) * (eta + 1.0) + cos_incident * cos_incident,
-    )
+pub fn fresnel_dielectric_from_outside(cos_incident: f32, eta: f32) -> f32 {
+    fresnel_from_eta_cos_squared(cos_incident, eta, (eta - 1.0) * (eta + 1.0) + cos_incident * cos_incident)
 }
 
-/// [`dielectric`] for light from either side, in `f32` for packets. Returns 1 for total internal reflection.
+/// [`fresnel_dielectric`] for light from either side, in `f32` for packets. Returns 1 for total internal reflection.
 #[inline(always)]
-pub fn dielectric_for_any_eta(cos_incident: f32, eta: f32) -> f32 {
+pub fn fresnel_dielectric_any_eta(cos_incident: f32, eta: f32) -> f32 {
     let squared = (eta - 1.0) * (eta + 1.0) + cos_incident * cos_incident;
-    dielectric_from_eta2_transmitted_cos2(cos_incident, eta, if squared > 0.0 { squared } else { 0.0 })
+    fresnel_from_eta_cos_squared(cos_incident, eta, if squared > 0.0 { squared } else { 0.0 })
 }
 
 /// Computes the reflectance of a dielectric boundary from η² times the squared cosine of the transmitted
 /// direction.
 #[inline(always)]
-fn dielectric_from_eta2_transmitted_cos2(cos_incident: f32, eta: f32, cos2_t: f32) -> f32 {
+fn fresnel_from_eta_cos_squared(cos_incident: f32, eta: f32, cos2_t: f32) -> f32 {
     let cos_t = cos2_t.sqrt();
     let squared = eta * eta;
     // Both cosines are multiplied by η. The `max` avoids 0/0 at grazing angles for η = 1.
@@ -61,7 +57,7 @@ pub fn fresnel_transmittance([cos_1, cos_2]: [f32; 2], [n_1, n_2]: [f32; 2]) -> 
 /// Reflectance of a conductor with index η and extinction k, for unpolarized light (Born and Wolf,
 /// *Principles of Optics*, section 14.2).
 #[inline(always)]
-pub fn conductor(cos_incident: f32, eta: f32, k: f32) -> f32 {
+pub fn fresnel_conductor(cos_incident: f32, eta: f32, k: f32) -> f32 {
     let cos2 = cos_incident * cos_incident;
     let sin2 = (1.0 - cos2).max(0.0);
     // a + ib is the square root of (η + ik)² − sin²θ. Compute the larger of a² and b² first, because the
@@ -93,7 +89,7 @@ pub fn schlick_weight(cos_incident: f32) -> f32 {
 }
 
 /// Direction in which Snell's law refracts the unit vector `incident`, given the unit normal on its side and
-/// the cosine from [`dielectric`].
+/// the cosine from [`fresnel_dielectric`].
 pub fn refract_given_transmitted_cosine(
     incident: Vec3,
     normal: Vec3,
@@ -113,7 +109,8 @@ mod tests {
         for eta in [1.0_f32, 1.01, 1.5, 2.5, 10.0] {
             for step in 0..=1000_u16 {
                 let cosine = f32::from(step) / 1000.0;
-                let (exact, found) = (dielectric(cosine, eta).0, dielectric_from_outside(cosine, eta));
+                let (exact, found) =
+                    (fresnel_dielectric(cosine, eta).0, fresnel_dielectric_from_outside(cosine, eta));
                 assert!(
                     (exact - found).abs() < 2e-6 || eta == 1.0 && cosine == 0.0,
                     "{eta} {cosine}: {found}"
@@ -127,8 +124,8 @@ mod tests {
         for eta in [0.4_f32, 0.75, 1.01, 1.5, 2.5] {
             for step in 1..=1000_u16 {
                 let cosine = f32::from(step) / 1000.0;
-                let (exact, through) = dielectric(cosine, eta);
-                assert!((exact - dielectric_for_any_eta(cosine, eta)).abs() < 2e-5, "{eta} {cosine}");
+                let (exact, through) = fresnel_dielectric(cosine, eta);
+                assert!((exact - fresnel_dielectric_any_eta(cosine, eta)).abs() < 2e-5, "{eta} {cosine}");
                 let Some(beyond) = through else { continue };
                 let there = fresnel_transmittance([cosine, beyond], [1.0, eta]);
                 assert!((1.0 - exact - there).abs() < 2e-5, "{eta} {cosine}: {there}");
@@ -161,23 +158,23 @@ mod tests {
             for step in 1..=100_u16 {
                 let cosine = f32::from(step) / 100.0;
                 let exact = conductor_of_complex_numbers(cosine.into(), eta.into(), k.into());
-                let found = f64::from(conductor(cosine, eta, k));
+                let found = f64::from(fresnel_conductor(cosine, eta, k));
                 assert!((exact - found).abs() < 2e-5, "{eta} + {k}i at {cosine}: {found} instead of {exact}");
             }
         }
         // With equal indices, nothing is reflected. Rounding must not make the reflectance negative.
         for eta in [1.0_f32, 1.0 - f32::EPSILON, 1.0 + f32::EPSILON, 1.001] {
             for step in 0..=1000_u16 {
-                let found = conductor(f32::from(step) / 1000.0, eta, 0.0);
+                let found = fresnel_conductor(f32::from(step) / 1000.0, eta, 0.0);
                 assert!((0.0..=1.0).contains(&found), "{eta} at {step}: {found}");
             }
         }
         // The reflectance of gold at normal incidence is ((η − 1)² + k²)/((η + 1)² + k²).
-        assert!((conductor(1.0, 0.108, 3.508) - 0.9681).abs() < 1e-4);
+        assert!((fresnel_conductor(1.0, 0.108, 3.508) - 0.9681).abs() < 1e-4);
     }
 
     fn reflectance(degrees: f64, eta: f32) -> f64 {
-        f64::from(dielectric(degrees.to_radians().cos() as f32, eta).0)
+        f64::from(fresnel_dielectric(degrees.to_radians().cos() as f32, eta).0)
     }
 
     #[test]
@@ -194,7 +191,7 @@ mod tests {
     #[test]
     fn reflection_is_total_beyond_critical_angle() {
         for (n, critical) in [(1.5, 41.8103), (1.33, 48.7535), (2.4, 24.6244)] {
-            let transmitted = |degrees: f64| dielectric(degrees.to_radians().cos() as f32, 1.0 / n).1;
+            let transmitted = |degrees: f64| fresnel_dielectric(degrees.to_radians().cos() as f32, 1.0 / n).1;
             assert!(transmitted(critical - 0.01).is_some(), "{n}");
             assert!(transmitted(critical + 0.01).is_none(), "{n}");
         }
@@ -205,7 +202,8 @@ mod tests {
         let mean = |eta: f32| {
             let n = 1_000_000;
             let cos2 = |i: i32| (f64::from(i) + 0.5) / f64::from(n);
-            (0..n).map(|i| f64::from(dielectric(cos2(i).sqrt() as f32, eta).0)).sum::<f64>() / f64::from(n)
+            (0..n).map(|i| f64::from(fresnel_dielectric(cos2(i).sqrt() as f32, eta).0)).sum::<f64>()
+                / f64::from(n)
         };
         assert!((mean(1.5) - 0.091_778_0).abs() < 1e-5);
         assert!((mean(1.0 / 1.5) - 0.596_345_8).abs() < 1e-5);
@@ -217,7 +215,7 @@ mod tests {
             for degrees in [0.0_f32, 20.0, 40.0] {
                 let (sin, cos) = degrees.to_radians().sin_cos();
                 let incident = Vec3::new(sin, -cos, 0.0);
-                let (_, cos_t) = dielectric(cos, eta);
+                let (_, cos_t) = fresnel_dielectric(cos, eta);
                 let refracted = refract_given_transmitted_cosine(
                     incident,
                     Vec3::Y,

@@ -293,7 +293,8 @@ impl VisibleNormalDistribution {
     /// The interval around `lit` on the chord in which facets reflect light above the surface. Its ends are
     /// relative to the chord's center, in units of half the chord's length.
     fn lit_interval(&self, x: f64, lit: f64) -> [f64; 2] {
-        [-1.0, 1.0].map(|end| last_true(lit, end, |part| self.reflected_direction_height(x, part) > 0.0))
+        [-1.0, 1.0]
+            .map(|end| bisect_last_true(lit, end, |part| self.reflected_direction_height(x, part) > 0.0))
     }
 }
 
@@ -305,7 +306,7 @@ fn smith_lambda(cosine: f64, alpha: f64) -> f64 {
 
 /// The last position from `from` toward `to` where a predicate is true, found by bisection. The predicate
 /// must be true at `from`.
-fn last_true(mut from: f64, mut to: f64, holds: impl Fn(f64) -> bool) -> f64 {
+fn bisect_last_true(mut from: f64, mut to: f64, holds: impl Fn(f64) -> bool) -> f64 {
     if holds(to) {
         return to;
     }
@@ -331,8 +332,9 @@ fn integrate_albedo<const ACROSS: usize, const ALONG: usize>(
 ) -> f64 {
     let facets = VisibleNormalDistribution::new(cosine, alpha);
     // Half of the disk is enough because the integrand is symmetric.
-    let widest =
-        last_true(0.0, 0.25 * TAU, |turn| facets.find_upward_reflecting_point(libm::sin(turn)).is_some());
+    let widest = bisect_last_true(0.0, 0.25 * TAU, |turn| {
+        facets.find_upward_reflecting_point(libm::sin(turn)).is_some()
+    });
     let along = quadrature_dense_at_ends(ALONG);
     let mut sum = 0.0;
     for (turn, by_turn) in quadrature_dense_at_ends(ACROSS) {
@@ -351,7 +353,7 @@ fn integrate_albedo<const ACROSS: usize, const ALONG: usize>(
     sum * 4.0 / TAU
 }
 
-/// Double-precision version of [`crate::materials::fresnel::dielectric`] for light from outside.
+/// Double-precision version of [`crate::materials::fresnel::fresnel_dielectric`] for light from outside.
 pub fn fresnel_dielectric_f64(cosine: f64, eta: f64) -> f64 {
     let root = (eta * eta - 1.0 + cosine * cosine).sqrt();
     let square = |over: f64, under: f64| if under > 0.0 { (over / under) * (over / under) } else { 0.0 };
@@ -361,7 +363,7 @@ pub fn fresnel_dielectric_f64(cosine: f64, eta: f64) -> f64 {
 
 /// Effective reflectance kd/(1 − kd·F_dr) of a diffuse base under a coat, for light that has entered the
 /// coat. `returned` is the coat's internal reflectance F_dr.
-pub fn reflectance_under_coat(diffuse: Vec3, returned: f32) -> Vec3 {
+pub fn reflectance_inside_coat(diffuse: Vec3, returned: f32) -> Vec3 {
     diffuse / (Vec3::ONE - diffuse * returned)
 }
 

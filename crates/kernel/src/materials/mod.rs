@@ -84,8 +84,8 @@ impl Material {
     }
 
     /// Whether the surface, or any part of a blend, scatters light only on its front.
-    pub fn is_black_from_behind(&self) -> bool {
-        !self.scatters_on_side(false) || self.any_blend_part_is(Self::is_black_from_behind)
+    pub fn may_be_black_from_behind(&self) -> bool {
+        !self.scatters_on_side(false) || self.any_blend_part_is(Self::may_be_black_from_behind)
     }
 
     /// Whether any material property depends on texture coordinates or tangents.
@@ -158,7 +158,7 @@ impl Material {
         if !self.emission.emits_on_side(is_front) {
             return Vec3::ZERO;
         }
-        let radiance = self.emission.radiance_of_emitting_side(at, cosine, lookups);
+        let radiance = self.emission.radiance_at_cosine(at, cosine, lookups);
         match &self.opacity {
             Some(opacity) => radiance * opacity.evaluate(at, lookups),
             None => radiance,
@@ -211,7 +211,7 @@ impl Material {
     }
 
     /// Whether any texture filters its lookups by the footprint.
-    pub fn is_mipmapped(&self) -> bool {
+    pub fn uses_footprint(&self) -> bool {
         self.textures().iter().any(|texture| texture.uses_footprint())
     }
 
@@ -305,7 +305,7 @@ impl Bsdf {
 
     /// The BSDF of a surface that has only non-δ lobes, or `None` for other materials.
     #[inline(always)]
-    pub fn as_non_specular(&self) -> Option<&NonSpecular> {
+    pub fn as_purely_non_specular(&self) -> Option<&NonSpecular> {
         match self {
             Self::NonSpecular(rough) => Some(rough),
             Self::Mirror(_)

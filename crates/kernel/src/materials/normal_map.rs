@@ -27,7 +27,7 @@ impl NormalMap {
         let mapped = image.lookup(at) * 2.0 - Vec3::ONE;
         let slope = image.flip_slopes_in_mirrored_tiles(at, mapped.truncate() * self.strength);
         let mapping = &image.mapping;
-        let [dpdu, dpdv] = mapping.transformed_tangents(mapping.uv_set_tangents(at, [dpdu, dpdv]));
+        let [dpdu, dpdv] = mapping.transformed_tangents(mapping.untransformed_tangents(at, [dpdu, dpdv]));
         let (tangent, bitangent) = orthogonalize_tangents(normal, dpdu, dpdv);
         let bent = tangent * slope.x + bitangent * slope.y + normal * mapped.z.abs();
         bent.try_normalize().unwrap_or(normal)

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::bxdfs::NonSpecular;
 use super::coat::Coat;
 use super::footprint::TexturePoint;
-use super::fresnel::dielectric;
+use super::fresnel::fresnel_dielectric;
 use super::mirror::Mirror;
 use super::texture::{ColorOrTexture, Texture};
 use crate::math::Vec3;
@@ -51,7 +51,7 @@ impl SpecularOverBase {
         match &self.specular {
             SpecularLayer::SmoothCoat { tint: _, ior } => {
                 let left = self.two_way_coat_transmittance(cosine, Vec3::ZERO, at, lookups);
-                left.max_element() * dielectric(cosine, *ior).0
+                left.max_element() * fresnel_dielectric(cosine, *ior).0
             }
             SpecularLayer::Mirror(_) => {
                 (self.two_way_coat_transmittance(cosine, mirror, at, lookups) * mirror).max_element()

@@ -98,7 +98,7 @@ impl Texture {
     /// Tangents ∂p/∂u and ∂p/∂v of the UV set used for lookups. `first` contains the tangents of the first set.
     #[inline]
     pub fn uv_set_tangents(&self, at: &TexturePoint, first: [Vec3; 2]) -> [Vec3; 2] {
-        self.mapping().map_or(first, |mapping| mapping.uv_set_tangents(at, first))
+        self.mapping().map_or(first, |mapping| mapping.untransformed_tangents(at, first))
     }
 
     /// Whether [`Texture::coverage_above_cutoff`] is known for any footprint.

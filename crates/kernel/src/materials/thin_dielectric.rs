@@ -1,6 +1,6 @@
 //! Thin panes: two parallel glass surfaces that are infinitely close together.
 
-use super::fresnel::dielectric;
+use super::fresnel::fresnel_dielectric;
 use super::texture::ColorOrTexture;
 
 /// An infinitely thin pane. Light passes undeflected unless it is reflected.
@@ -17,7 +17,7 @@ impl ThinDielectric {
     /// of a single side. This accounts for all reflections between the two sides.
     #[inline]
     pub fn reflectance(&self, cosine: f32) -> f32 {
-        let (side, _) = dielectric(cosine.abs(), self.ior);
+        let (side, _) = fresnel_dielectric(cosine.abs(), self.ior);
         2.0 * side / (1.0 + side)
     }
 }
@@ -32,7 +32,7 @@ mod tests {
         let pane = ThinDielectric { ior: 1.5, tint: ColorOrTexture::Constant(Vec3::ONE) };
         for degrees in [0.0_f32, 30.0, 60.0, 80.0, 89.0] {
             let cosine = degrees.to_radians().cos();
-            let r = f64::from(dielectric(cosine, 1.5).0);
+            let r = f64::from(fresnel_dielectric(cosine, 1.5).0);
             // Sum the series R + T²R + T²R³ + …
             let series: f64 = r + (0..2000).map(|k| (1.0 - r).powi(2) * r.powi(2 * k + 1)).sum::<f64>();
             assert!((f64::from(pane.reflectance(cosine)) - series).abs() < 1e-6, "{degrees}");

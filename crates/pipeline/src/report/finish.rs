@@ -122,7 +122,7 @@ fn light_sampling_report(finished: &RequestResults<'_>) -> LightSamplingReport {
         sampled,
         picks,
         tree_nodes: selection.map_or(0, |selection| selection.tree.node_count()) as u64,
-        memory_bytes: lights.tree_memory_bytes() as u64,
+        memory_bytes: lights.light_trees_memory_bytes() as u64,
     }
 }
 

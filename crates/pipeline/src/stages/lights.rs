@@ -69,7 +69,7 @@ pub(crate) fn collect_lights(
 
 /// Describes the light tree for a scene that has too many lights to sample all of them.
 fn describe_light_tree(which: &str, lights: &Lights) -> String {
-    format!(", {which}; light tree {} kB", lights.tree_memory_bytes().div_ceil(1000))
+    format!(", {which}; light tree {} kB", lights.light_trees_memory_bytes().div_ceil(1000))
 }
 
 /// Returns the textures used by the scene file's emissive materials.

@@ -78,7 +78,7 @@ fn constant_albedo(tile: &TileContext<'_>, index: usize) -> Option<Vec3> {
     let material = &tile.world.materials[index];
     let is_constant = !tile.world.material_needs_uvs_or_tangents(index)
         && !material.has_null_interaction()
-        && !material.is_black_from_behind();
+        && !material.may_be_black_from_behind();
     is_constant.then(|| material.bsdf.main_color(&TexturePoint::from_uv(DVec2::ZERO), &mut 0))
 }
 

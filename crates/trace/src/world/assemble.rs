@@ -34,7 +34,7 @@ impl World {
             packet_material: materials.iter().map(PacketShadingMaterial::from_material).collect(),
             has_directions: materials.iter().any(|material| material.bsdf.is_anisotropic()),
             textured: materials.iter().map(Material::needs_uvs_or_tangents).collect(),
-            mipmapped: materials.iter().map(Material::is_mipmapped).collect(),
+            mipmapped: materials.iter().map(Material::uses_footprint).collect(),
             materials,
             object_materials,
             lights,

@@ -30,7 +30,7 @@ use crate::scene::description::{self, MaterialKind, Scene};
 
 /// Sampling tables for the environment map, or `None` if the image is black.
 pub fn build_environment_map(texels: &Arc<Texels>, rows: MapRowPlacement) -> Option<Arc<EnvironmentMap>> {
-    EnvironmentMap::with_rows(Arc::clone(texels), rows).map(Arc::new)
+    EnvironmentMap::with_row_placement(Arc::clone(texels), rows).map(Arc::new)
 }
 
 /// Evaluates the environment's sky.
@@ -121,7 +121,7 @@ fn environment_lights(
         }
         (None, Some(_), Some(EnvironmentSource::Map(map))) => {
             let orientation = match orientation {
-                description::MapOrientation::Turn(degrees) => MapOrientation::from_degrees(*degrees),
+                description::MapOrientation::Turn(degrees) => MapOrientation::from_azimuth_degrees(*degrees),
                 description::MapOrientation::Rotation(rotation) => {
                     MapOrientation::Rotation(rotation.as_mat3())
                 }

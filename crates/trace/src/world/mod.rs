@@ -134,7 +134,7 @@ pub struct World {
     camera_solids: Vec<(u32, u32)>,
     /// Other glass solids in which parallel camera rays may start.
     solids_near_ray_origins: Vec<CompoundSolid>,
-    /// Whether each material is mipmapped; see [`Material::is_mipmapped`].
+    /// Whether each material is mipmapped; see [`Material::uses_footprint`].
     mipmapped: Box<[bool]>,
     /// Whether any texture uses a mesh's second UV set or the shape's own coordinates.
     has_extra_coordinates: bool,
@@ -222,7 +222,7 @@ impl World {
         self.textured[material]
     }
 
-    /// Whether a material is mipmapped; see [`Material::is_mipmapped`].
+    /// Whether a material is mipmapped; see [`Material::uses_footprint`].
     #[inline(always)]
     pub fn is_material_mipmapped(&self, material: usize) -> bool {
         self.mipmapped[material]

@@ -27,9 +27,9 @@ impl PacketShadingMaterial {
     /// textured or coated emission, may be a null interaction, or has a BSDF that does not support packets.
     pub(super) fn from_material(material: &Material) -> Option<Self> {
         let Material { bsdf, sides: _, emission, normal_perturbation, opacity } = material;
-        let is_black_from_behind = material.is_black_from_behind();
+        let is_black_from_behind = material.may_be_black_from_behind();
         let is_even = emission.texture.is_none() && emission.coat.is_none();
-        let rough = bsdf.as_non_specular().filter(|rough| rough.supports_packets())?;
+        let rough = bsdf.as_purely_non_specular().filter(|rough| rough.supports_packets())?;
         (is_even && normal_perturbation.is_none() && opacity.is_none()).then(|| Self {
             kind: rough.kind(),
             row_texture: rough.texture_for_packets().map(Texture::uv_set),
@@ -60,6 +60,6 @@ impl World {
         material: usize,
     ) -> Option<(&PacketShadingMaterial, &NonSpecular)> {
         let packet_material = self.packet_material[material].as_ref()?;
-        Some((packet_material, self.materials[material].bsdf.as_non_specular()?))
+        Some((packet_material, self.materials[material].bsdf.as_purely_non_specular()?))
     }
 }

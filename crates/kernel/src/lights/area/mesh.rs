@@ -173,7 +173,7 @@ impl MeshEmitter {
         })
     }
 
-    /// Implements [`Light::pdf`](crate::lights::Light::pdf).
+    /// Implements [`Light::pdf_of_hit`](crate::lights::Light::pdf_of_hit).
     pub fn pdf(&self, from: Vec3, normal: Vec3, hit: &LightHitPoint) -> f32 {
         let tree = match &self.sampling {
             MeshSampling::Quad(quad) => return quad.quad.pdf(from, hit),

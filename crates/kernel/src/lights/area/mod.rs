@@ -372,7 +372,7 @@ impl AreaLight {
         if is_sheer { GeometryOfLight::SeeThrough(self.object) } else { GeometryOfLight::Object(self.object) }
     }
 
-    /// Implements [`Light::pdf`](super::Light::pdf).
+    /// Implements [`Light::pdf_of_hit`](super::Light::pdf_of_hit).
     pub fn pdf(&self, from: Vec3, normal: Vec3, hit: &LightHitPoint) -> f32 {
         let hit = &match self.side {
             Side::Front => *hit,

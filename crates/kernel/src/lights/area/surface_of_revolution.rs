@@ -285,7 +285,7 @@ impl RevolutionSide for ConeSide {
 impl ConeView {
     /// Angle at the tip between the direction to the point and the line where a half plane intersects the
     /// side.
-    fn generatrix_angle_at_tip(&self, around: SinCos) -> SinCos {
+    fn tip_angle_to_generatrix(&self, around: SinCos) -> SinCos {
         let ((m, sin), c) = (self.off_axis, self.cos_opening);
         let q = sin * around.cos;
         let square = m * m + q * q;
@@ -306,14 +306,14 @@ impl RevolutionSideView for ConeView {
     }
 
     fn visible_polar_cosine_extent(&self, around: SinCos) -> f64 {
-        let at_tip = self.generatrix_angle_at_tip(around);
+        let at_tip = self.tip_angle_to_generatrix(around);
         let (along, across) = (self.distance - self.slant * at_tip.cos, self.slant * at_tip.sin);
         let length = (along * along + across * across).sqrt();
         if along > 0.0 { across * across / (length * (length + along)) } else { 1.0 - along / length }
     }
 
     fn polar_angle_and_distance_at_fraction(&self, around: SinCos, fraction: f64) -> (SinCos, f64) {
-        let at_tip = self.generatrix_angle_at_tip(around);
+        let at_tip = self.tip_angle_to_generatrix(around);
         let versine = fraction * self.visible_polar_cosine_extent(around);
         let from_pole = SinCos { sin: (versine * (2.0 - versine)).max(0.0).sqrt(), cos: 1.0 - versine };
         let sin = at_tip.sin * from_pole.cos + at_tip.cos * from_pole.sin;

@@ -97,7 +97,7 @@ impl ShapeEmitter for TorusEmitter {
         };
         let (sine, in_slice) = slice.elevation_distribution(&view).sample(f64::from(u[1]));
         let place = slice.near_intersection(&view, slice.slice_tan_from_elevation_sin(2.0 * sine - 1.0));
-        let own = view.to_density_over_angle(density, tau) * 0.5 * in_slice / place.factor;
+        let own = view.tau_to_angle_density(density, tau) * 0.5 * in_slice / place.factor;
         if !(own > 0.0) {
             return SampledLightPoint::NOTHING;
         }
@@ -194,7 +194,7 @@ impl TorusView {
     }
 
     /// Converts a density over τ/τ_max on one side to a density over φ on both sides.
-    fn to_density_over_angle(&self, density: f64, tau: f64) -> f64 {
+    fn tau_to_angle_density(&self, density: f64, tau: f64) -> f64 {
         0.5 * density * self.closeness / (libm::cosh(tau) * self.reach)
     }
 
@@ -258,7 +258,7 @@ impl TorusView {
         let in_slice = slice
             .elevation_distribution(self)
             .pdf((0.5 + 0.5 * slice.elevation_sine_from_slice_tangent(tangent)).clamp(0.0, 1.0));
-        self.to_density_over_angle(slices.pdf(share), share * self.reach) * 0.5 * in_slice / factor
+        self.tau_to_angle_density(slices.pdf(share), share * self.reach) * 0.5 * in_slice / factor
     }
 }
 

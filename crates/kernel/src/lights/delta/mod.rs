@@ -13,14 +13,14 @@ use crate::math::Vec3;
 use crate::math::lanes::{Vec3x16, lane};
 
 /// A light without extent: a point light or a spotlight.
-pub trait DeltaLight {
+pub trait DeltaPositionLight {
     /// An isotropic light with the same position, falloff, and peak intensity.
     fn isotropic_at_peak_intensity(&self) -> &PointLight;
 
     /// Intensity in a unit direction away from the light, relative to the peak intensity, in [0, 1].
     fn relative_intensity(&self, away: Vec3) -> f32;
 
-    /// Power divided by the peak intensity, in sr: the integral of [`DeltaLight::relative_intensity`].
+    /// Power divided by the peak intensity, in sr: the integral of [`DeltaPositionLight::relative_intensity`].
     fn effective_solid_angle(&self) -> f64;
 
     /// Samples a unit direction away from the light, with a pdf proportional to the intensity. `u` is in [0,
@@ -51,7 +51,7 @@ pub trait DeltaLight {
         })
     }
 
-    /// [`DeltaLight::sample`] for a packet of points.
+    /// [`DeltaPositionLight::sample`] for a packet of points.
     #[inline(always)]
     fn sample_packet(&self, points: &Vec3x16) -> LightSamplePacket {
         let target = self.isotropic_at_peak_intensity().position.as_vec3();

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use super::DeltaLight;
+use super::DeltaPositionLight;
 use crate::choice;
 use crate::lights::tree::bounds::{DistanceFalloff, EmissionCone, LightBounds, mean_channel};
 use crate::math::{DVec3, Vec3};
@@ -44,7 +44,7 @@ impl PointLight {
     }
 }
 
-impl DeltaLight for PointLight {
+impl DeltaPositionLight for PointLight {
     fn isotropic_at_peak_intensity(&self) -> &PointLight {
         self
     }

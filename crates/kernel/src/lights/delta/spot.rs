@@ -2,7 +2,7 @@
 
 use std::f32::consts::{FRAC_PI_2, PI};
 
-use super::{DeltaLight, PointLight};
+use super::{DeltaPositionLight, PointLight};
 use crate::lights::tree::bounds::{EmissionCone, LightBounds};
 use crate::math::Vec3;
 use crate::math::elementary::{acos, sin_cos};
@@ -22,7 +22,7 @@ pub struct SpotLight {
     pub blend: f32,
 }
 
-impl DeltaLight for SpotLight {
+impl DeltaPositionLight for SpotLight {
     fn isotropic_at_peak_intensity(&self) -> &PointLight {
         &self.point
     }

@@ -48,7 +48,7 @@ pub enum MapOrientation {
 
 impl MapOrientation {
     /// Rotation about +y by an angle in degrees, counterclockwise when seen from above.
-    pub fn from_degrees(degrees: f64) -> Self {
+    pub fn from_azimuth_degrees(degrees: f64) -> Self {
         Self::Turn((degrees / 360.0).rem_euclid(1.0) as f32)
     }
 
@@ -81,7 +81,7 @@ impl MapOrientation {
 
     /// Applies `convert` to a packet of directions if the orientation is a general rotation.
     #[inline(always)]
-    fn convert_packet_if_rotated(self, directions: &mut Vec3x16, convert: impl Fn(Self, Vec3) -> Vec3) {
+    fn convert_if_general_rotation(self, directions: &mut Vec3x16, convert: impl Fn(Self, Vec3) -> Vec3) {
         match self {
             Self::Turn(_) => {}
             Self::Rotation(_) => {
@@ -128,7 +128,7 @@ impl Environment {
             Self::Map { sky, factor, orientation } => {
                 let mut directions = *directions;
                 orientation
-                    .convert_packet_if_rotated(&mut directions, |own, direction| own.to_map(direction).0);
+                    .convert_if_general_rotation(&mut directions, |own, direction| own.to_map(direction).0);
                 let (mut colors, pdfs) =
                     sky.lookup_color_and_pdf_packet(&directions, orientation.turn_for_map_sampling());
                 for i in 0..PACKET_SIZE {
@@ -157,7 +157,7 @@ impl Environment {
             Self::Map { sky, factor, orientation } => {
                 let (mut directions, mut colors, pdfs) =
                     sky.sample_packet(u, orientation.turn_for_map_sampling());
-                orientation.convert_packet_if_rotated(&mut directions, MapOrientation::to_world);
+                orientation.convert_if_general_rotation(&mut directions, MapOrientation::to_world);
                 for i in 0..PACKET_SIZE {
                     let color = lane(&colors, i) * *factor;
                     set_lane(&mut colors, i, color);

@@ -65,12 +65,12 @@ struct TexelPosition {
 impl EnvironmentMap {
     /// Creates a map from nonnegative texels. Returns `None` if all texels are black.
     pub fn new(texels: Arc<Texels>) -> Option<Self> {
-        Self::with_rows(texels, MapRowPlacement::Centers)
+        Self::with_row_placement(texels, MapRowPlacement::Centers)
     }
 
     /// Creates a map from nonnegative texels whose rows have the given polar angles. Returns `None` if all
     /// texels are black.
-    pub fn with_rows(texels: Arc<Texels>, map_rows: MapRowPlacement) -> Option<Self> {
+    pub fn with_row_placement(texels: Arc<Texels>, map_rows: MapRowPlacement) -> Option<Self> {
         let (columns, rows) = (texels.width as usize, texels.height as usize);
         let scale_and_offset @ (scale, offset) = map_rows.scale_and_offset(texels.height);
         let height = |row: usize| match row {
@@ -244,7 +244,7 @@ impl EnvironmentMap {
         let (mut heights, mut pdfs) = ([0.0; PACKET_SIZE], [0.0; PACKET_SIZE]);
         for i in 0..PACKET_SIZE {
             pdfs[i] = self.cell_pdf(columns[i], rows[i]);
-            heights[i] = self.row_fraction_above_direction(rows[i], directions[1][i]);
+            heights[i] = self.fraction_of_row_above(rows[i], directions[1][i]);
         }
         let mut colors = [[0.0; PACKET_SIZE]; 3];
         for i in 0..PACKET_SIZE {
@@ -260,7 +260,7 @@ impl EnvironmentMap {
         let (x, y) = self.cell_coordinates(direction, turn);
         let (column, row) = self.cell_from_cell_coordinates(x, y);
         let between = [x - column as f32, y - row as f32];
-        let along = [between[0], self.row_fraction_above_direction(row, direction.y)];
+        let along = [between[0], self.fraction_of_row_above(row, direction.y)];
         TexelPosition { column, row, between, along }
     }
 
@@ -284,7 +284,7 @@ impl EnvironmentMap {
 
     /// Fraction of a row's height that is above a direction.
     #[inline(always)]
-    fn row_fraction_above_direction(&self, row: u32, y: f32) -> f32 {
+    fn fraction_of_row_above(&self, row: u32, y: f32) -> f32 {
         let (top, bottom) = (self.heights[row as usize], self.heights[row as usize + 1]);
         (((top - f64::from(y)) / (top - bottom)) as f32).max(0.0).min(1.0)
     }

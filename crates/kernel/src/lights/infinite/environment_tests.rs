@@ -14,7 +14,7 @@ fn texels_from_fn(width: u32, height: u32, color: impl Fn(u32, u32) -> Vec3) -> 
 }
 
 fn environment_from_texels(texels: &Arc<Texels>, degrees: f64) -> Environment {
-    oriented(texels, MapOrientation::from_degrees(degrees))
+    oriented(texels, MapOrientation::from_azimuth_degrees(degrees))
 }
 
 fn oriented(texels: &Arc<Texels>, orientation: MapOrientation) -> Environment {
@@ -80,7 +80,7 @@ fn lookups_match_the_reference() {
                         .expect("light"),
                 ),
                 factor: Vec3::new(1.0, 2.0, 3.0),
-                orientation: MapOrientation::from_degrees(degrees),
+                orientation: MapOrientation::from_azimuth_degrees(degrees),
             };
             // At the poles, any azimuth is correct.
             for direction in random_directions(4000).filter(|direction| direction.y.abs() < 1.0) {
@@ -127,7 +127,7 @@ fn rotated_maps_move_with_their_axes() {
 fn rows_at_the_poles_are_interpolated_exactly() {
     for height in [2, 3, 17] {
         let texels = texels_from_fn(8, height, |_, y| Vec3::splat(y as f32 / (height - 1) as f32));
-        let map = EnvironmentMap::with_rows(texels, MapRowPlacement::Poles).expect("light");
+        let map = EnvironmentMap::with_row_placement(texels, MapRowPlacement::Poles).expect("light");
         for direction in random_directions(500) {
             let (color, _) = map.lookup_color_and_pdf(direction, 0.0);
             let expected = (f64::from(direction.y).clamp(-1.0, 1.0).acos() / PI) as f32;
@@ -159,7 +159,8 @@ fn sample_pdfs_equal_direction_pdfs() {
     ] {
         let Some(sky) = EnvironmentMap::new(texels) else { continue };
         let sky = Arc::new(sky);
-        let orientations = [MapOrientation::from_degrees(77.0), MapOrientation::Rotation(tilted().as_mat3())];
+        let orientations =
+            [MapOrientation::from_azimuth_degrees(77.0), MapOrientation::Rotation(tilted().as_mat3())];
         let (mut found, mut off) = (0, 0);
         for i in 0..20_000 {
             let orientation = orientations[i as usize % 2];
@@ -228,7 +229,9 @@ fn pdfs_integrate_to_one_and_cover_all_light() {
 #[test]
 fn sample_frequencies_match_the_pdf() {
     let (width, height) = (24_usize, 12_usize);
-    for orientation in [MapOrientation::from_degrees(135.0), MapOrientation::Rotation(tilted().as_mat3())] {
+    for orientation in
+        [MapOrientation::from_azimuth_degrees(135.0), MapOrientation::Rotation(tilted().as_mat3())]
+    {
         let environment = oriented(&irregular_texels(width as u32, height as u32), orientation);
         let (columns, rows) = (3 * width, 64);
         let count = 1_000_000;

@@ -6,7 +6,7 @@ use arrayvec::ArrayVec;
 
 use super::BoundingSphere;
 use crate::lights::area::sphere::one_minus_cos_from_sin2;
-use crate::lights::delta::DeltaLight;
+use crate::lights::delta::DeltaPositionLight;
 use crate::math::frame::Frame;
 use crate::math::{DVec3, Vec3};
 use crate::sampling::distribution::DiscreteDistribution;
@@ -29,8 +29,8 @@ pub enum EmissionProfile<'a> {
     /// A delta light's distribution.
     Light {
         /// The light.
-        light: &'a dyn DeltaLight,
-        /// [`DeltaLight::effective_solid_angle`], which is expensive to compute for some lights.
+        light: &'a dyn DeltaPositionLight,
+        /// [`DeltaPositionLight::effective_solid_angle`], which is expensive to compute for some lights.
         spread: f64,
     },
     /// A cosine distribution around this unit normal.

@@ -13,7 +13,7 @@ use crate::geometry::torus::Torus;
 use crate::geometry::transformed::tests::{part_area_by_midpoint_rule, sheared};
 use crate::geometry::triangle::Triangle;
 use crate::lights::area::Side;
-use crate::lights::delta::DeltaLight;
+use crate::lights::delta::DeltaPositionLight;
 use crate::lights::delta::SpotLight;
 use crate::lights::infinite::sky::sun::OrientedSunDisk;
 use crate::lights::infinite::sky::{Sky, SkyFrame, SkyModelInputs};
@@ -459,7 +459,7 @@ fn photons_from_infinity_fill_the_disk() {
 fn aimed_pdfs_integrate_to_one() {
     let (spot, from) = (spot(100.0, 0.5), point(Falloff::Square).position);
     let all = targets();
-    let lights: [&dyn DeltaLight; 2] = [&point(Falloff::Square), &spot];
+    let lights: [&dyn DeltaPositionLight; 2] = [&point(Falloff::Square), &spot];
     let [everywhere, cone] =
         lights.map(|light| EmissionProfile::Light { light, spread: light.effective_solid_angle() });
     let sends = [everywhere, cone, EmissionProfile::Front(DVec3::new(0.0, 0.6, 0.8))];

@@ -126,7 +126,7 @@ impl LightBounds {
             space,
             center,
             radius: reaches.fold(0.0, f64::max).min((max - min).length() * 0.5),
-            power: direction_averaged_intensity(all.clone()),
+            power: combined_intensity_along_axes(all.clone()),
             cone: EmissionCone::union_of_all(all.map(|one| &one.cone)),
         })
     }
@@ -135,7 +135,7 @@ impl LightBounds {
 /// Expected intensity of several lights, averaged over directions within the spread of their axes. Cosine
 /// emitters contribute all of their power if their axes agree, and a quarter of it if the axes are uniformly
 /// distributed.
-fn direction_averaged_intensity<'a>(all: impl Iterator<Item = &'a LightBounds>) -> f64 {
+fn combined_intensity_along_axes<'a>(all: impl Iterator<Item = &'a LightBounds>) -> f64 {
     let (mut everywhere, mut by_cosine, mut axes) = (0.0, 0.0, DVec3::ZERO);
     for LightBounds { power, cone, .. } in all {
         match cone.edge {

@@ -313,12 +313,12 @@ fn specialized_contributions<const IS_PLAIN: bool, const HAS_LOBE: bool>(
     let [mut square, mut least, mut along] = [[0.0; PACKET_SIZE]; 3];
     for i in 0..PACKET_SIZE {
         square[i] = lane(&offset, i).length_squared();
-        least[i] = clamp_min(bounds.radius[i] * bounds.radius[i], MIN_IMPORTANCE);
+        least[i] = max_or_second_if_nan(bounds.radius[i] * bounds.radius[i], MIN_IMPORTANCE);
         along[i] = lane(normal, i).dot(lane(&offset, i));
     }
     let mut inverse = square;
     for i in 0..PACKET_SIZE {
-        inverse[i] = clamp_min(square[i], least[i]);
+        inverse[i] = max_or_second_if_nan(square[i], least[i]);
     }
     replace_by_inverse_sqrt(&mut inverse);
     // Let θ be the angle between the normal and the sphere's center, and β half the angle that the sphere
@@ -331,8 +331,8 @@ fn specialized_contributions<const IS_PLAIN: bool, const HAS_LOBE: bool>(
         towards[i] = if square[i] <= least[i] { 1.0 } else { sum };
         // The cosines for points in a sphere are approximately uniformly distributed between the minimum and
         // the maximum. Negative cosines contribute nothing.
-        let above = clamp_min(towards[i], 0.0);
-        let cut = above * above * bounds.spread[i] * clamp_min(square[i], least[i]) * inverse[i];
+        let above = max_or_second_if_nan(towards[i], 0.0);
+        let cut = above * above * bounds.spread[i] * max_or_second_if_nan(square[i], least[i]) * inverse[i];
         mean[i] = if straight > sin[i] { straight } else { cut };
     }
     let (mut value, mut away) = ([0.0; PACKET_SIZE], [1.0; PACKET_SIZE]);
@@ -344,7 +344,7 @@ fn specialized_contributions<const IS_PLAIN: bool, const HAS_LOBE: bool>(
         let [mut cos, mut without] = [[0.0; PACKET_SIZE]; 2];
         for i in 0..PACKET_SIZE {
             cos[i] = -lane(&bounds.axis, i).dot(lane(&offset, i)) * inverse[i];
-            without[i] = clamp_min(1.0 - cos[i] * cos[i], MIN_IMPORTANCE);
+            without[i] = max_or_second_if_nan(1.0 - cos[i] * cos[i], MIN_IMPORTANCE);
         }
         let rest = without;
         replace_by_inverse_sqrt(&mut without);
@@ -370,7 +370,7 @@ fn specialized_contributions<const IS_PLAIN: bool, const HAS_LOBE: bool>(
     }
     let (mut importance, mut nearness) = ([0.0; PACKET_SIZE], [0.0; PACKET_SIZE]);
     for i in 0..PACKET_SIZE {
-        let value = min_or_second_if_nan(clamp_min(value[i], MIN_IMPORTANCE), MAX_IMPORTANCE);
+        let value = min_or_second_if_nan(max_or_second_if_nan(value[i], MIN_IMPORTANCE), MAX_IMPORTANCE);
         let arrives = (towards[i] > -MIN_COSINE)
             & (IS_PLAIN | (away[i] > bounds.end[i] - MIN_COSINE))
             & (bounds.power[i] > 0.0);
@@ -397,11 +397,11 @@ fn replace_by_inverse_sqrt(x: &mut F32x16) {
 /// Clamps a bound on a cosine.
 #[inline(always)]
 fn clamp_to_positive_cosine_range(bound: f32) -> f32 {
-    min_or_second_if_nan(clamp_min(bound, MIN_COSINE), 1.0)
+    min_or_second_if_nan(max_or_second_if_nan(bound, MIN_COSINE), 1.0)
 }
 
 #[inline(always)]
-fn clamp_min(x: f32, least: f32) -> f32 {
+fn max_or_second_if_nan(x: f32, least: f32) -> f32 {
     if x > least { x } else { least }
 }
 

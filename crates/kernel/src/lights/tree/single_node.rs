@@ -105,7 +105,7 @@ impl SingleNodeLightImportances<'_> {
 
     /// Probabilities of `picks` with these importances.
     #[inline(always)]
-    pub fn pick_probabilities(&self, picks: &LightPickPacket) -> F32x16 {
+    pub fn probabilities_of_picks(&self, picks: &LightPickPacket) -> F32x16 {
         let mut values = [0.0; PACKET_SIZE];
         for i in 0..PACKET_SIZE {
             values[i] = self.importance[picks.children[i] as usize % PACKET_SIZE][i];

@@ -399,7 +399,7 @@ fn packet_picks_match_single_picks() {
                 tree.importance_if_single_node(&row, round % 2 == 0, PortableSimd).expect("one node");
             let numbers: [f64; PACKET_SIZE] = std::array::from_fn(|_| f64::from(next()));
             let picks = shares.pick_packet(&numbers);
-            assert_eq!(shares.pick_probabilities(&picks), picks.probabilities);
+            assert_eq!(shares.probabilities_of_picks(&picks), picks.probabilities);
             for (i, receiver) in receivers.iter().enumerate() {
                 let alone = tree.pick(receiver, numbers[i]);
                 let Some(alone) = alone else {

@@ -50,7 +50,7 @@ impl<B: Bxdf> BxdfPacket<B> {
         }
     }
 
-    /// [`BxdfPacket::set_normals_and_directions`].
+    /// [`BxdfPacket::set_normals_and_ray_directions`].
     #[inline(always)]
     pub(crate) fn set_normals_and_directions_out_of_line(
         &mut self,
@@ -60,7 +60,7 @@ impl<B: Bxdf> BxdfPacket<B> {
         simd: impl Simd,
     ) {
         if B::IS_INLINED {
-            self.set_normals_and_directions(of, normals, directions);
+            self.set_normals_and_ray_directions(of, normals, directions);
         } else {
             simd.call_out_of_line(NormalsAndDirectionsKernel { packet: self, of, normals, directions });
         }
@@ -137,7 +137,7 @@ impl<B: Bxdf> SimdKernel for MaterialKernel<'_, B> {
     }
 }
 
-/// Kernel of [`BxdfPacket::set_normals_and_directions`].
+/// Kernel of [`BxdfPacket::set_normals_and_ray_directions`].
 struct NormalsAndDirectionsKernel<'a, B: Bxdf> {
     packet: &'a mut BxdfPacket<B>,
     of: Option<&'a Mask>,
@@ -150,7 +150,7 @@ impl<B: Bxdf> SimdKernel for NormalsAndDirectionsKernel<'_, B> {
 
     #[inline(always)]
     fn run(self, _: impl Simd) {
-        self.packet.set_normals_and_directions(self.of, self.normals, self.directions);
+        self.packet.set_normals_and_ray_directions(self.of, self.normals, self.directions);
     }
 }
 

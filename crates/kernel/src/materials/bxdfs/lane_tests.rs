@@ -7,7 +7,7 @@ use crate::math::random::unit_generator as random;
 use crate::math::{DVec3, Vec3};
 
 use super::lobe_tests::{NarrowLightPath, TANGENT, spherical_direction};
-use super::test_packet::TestPacket;
+use super::test_packet::OutOfLineTestPacket;
 use std::f64::consts::TAU;
 
 /// Checks that values, pdfs, and samples of a surface do not depend on the other lanes.
@@ -32,7 +32,7 @@ pub fn check_lane_independence_with<B: Bxdf>(points: &[B::Point], lit: NarrowLig
         let (choices, u) =
             (std::array::from_fn(|_| next()), [(); 2].map(|()| std::array::from_fn(|_| next())));
         let row = |of: &dyn Fn(usize) -> bool| {
-            let mut row = TestPacket::<B>::empty();
+            let mut row = OutOfLineTestPacket::<B>::empty();
             for i in (0..PACKET_SIZE).filter(|i| of(*i)) {
                 let place = ShadingGeometry {
                     normal: Vec3::Z * lit.light_side_sign() as f32,
@@ -43,7 +43,7 @@ pub fn check_lane_independence_with<B: Bxdf>(points: &[B::Point], lit: NarrowLig
             }
             row
         };
-        let numbers = |row: &TestPacket<B>, i: usize| {
+        let numbers = |row: &OutOfLineTestPacket<B>, i: usize| {
             let values = row.f(&light);
             let mut bits: Vec<u32> = lane(&values.f(), i).to_array().map(f32::to_bits).to_vec();
             for lobes in [LobesToSample::All, LobesToSample::Narrow] {
@@ -89,7 +89,7 @@ pub fn check_shown_lobes<B: Bxdf>(points: &[B::Point], lit: NarrowLightPath) {
                 tangent: TANGENT,
             };
             let shown = |diffuse: bool, specular: bool| {
-                let mut row = TestPacket::<B>::empty();
+                let mut row = OutOfLineTestPacket::<B>::empty();
                 row.set_bsdf(0, point, ShownLobes::Of { diffuse, specular }, &place);
                 let mut light = [[0.0; PACKET_SIZE], [0.0; PACKET_SIZE], [1.0; PACKET_SIZE]];
                 set_lane(&mut light, 0, way);

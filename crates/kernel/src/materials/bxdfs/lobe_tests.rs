@@ -10,7 +10,7 @@ use crate::math::random::unit_generator as random;
 use crate::math::{DVec3, Vec3};
 
 use super::reference_tests::squared_slope;
-use super::test_packet::TestPacket;
+use super::test_packet::OutOfLineTestPacket;
 use std::f64::consts::{PI, TAU};
 
 /// The tested values of α.
@@ -94,7 +94,7 @@ pub struct TwoSidedSample {
 
 /// A surface whose normal is the z axis, seen from a direction.
 pub struct TestSurface<B: Bxdf> {
-    row: TestPacket<B>,
+    row: OutOfLineTestPacket<B>,
     to_eye: DVec3,
     alphas: [f64; 2],
     light: NarrowLightPath,
@@ -113,7 +113,7 @@ impl<B: Bxdf> TestSurface<B> {
         to_eye: DVec3,
         light: NarrowLightPath,
     ) -> Self {
-        let mut row = TestPacket::<B>::empty();
+        let mut row = OutOfLineTestPacket::<B>::empty();
         for i in 0..PACKET_SIZE {
             let normal = Vec3::Z * light.light_side_sign() as f32;
             let place = ShadingGeometry { normal, wo: to_eye.as_vec3(), tangent: TANGENT };

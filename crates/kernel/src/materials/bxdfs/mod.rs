@@ -267,9 +267,9 @@ macro_rules! kinds {
                 }
             }
 
-            /// [`BxdfPacket::set_normals_and_directions`].
+            /// [`BxdfPacket::set_normals_and_ray_directions`].
             #[inline(always)]
-            pub fn set_normals_and_directions(
+            pub fn set_normals_and_ray_directions(
                 &mut self,
                 of: Option<&Mask>,
                 normals: &mut Vec3x16,
@@ -377,12 +377,12 @@ macro_rules! kinds {
                 }
             }
 
-            /// [`BxdfPacket::mask_narrower_than`].
+            /// [`BxdfPacket::mask_of_lanes_narrower_than`].
             #[inline(always)]
-            pub fn mask_narrower_than(&self, of: u32, exponent: f32) -> u32 {
+            pub fn mask_of_lanes_narrower_than(&self, of: u32, exponent: f32) -> u32 {
                 match self {
-                    $(Self::$kind(row) => row.mask_narrower_than(of, exponent),)+
-                    $(Self::$part(row) => row.mask_narrower_than(of, exponent)),+
+                    $(Self::$kind(row) => row.mask_of_lanes_narrower_than(of, exponent),)+
+                    $(Self::$part(row) => row.mask_of_lanes_narrower_than(of, exponent)),+
                 }
             }
 
@@ -413,11 +413,11 @@ kinds! {
     Phong(Phong, PhongBxdf, kept: BxdfPacket<PhongBxdf>),
     /// The Phong model with diffuse transmission.
     TranslucentPhong(TranslucentPhong, TranslucentBxdf<false>, kept: Box<BxdfPacket<TranslucentBxdf<false>>>),
-    /// An isotropic microfacet conductor.
+    /// An isotropic microfacet fresnel_conductor.
     Conductor(Conductor, ConductorBxdf<false, false>, kept: Box<BxdfPacket<ConductorBxdf<false, false>>>),
-    /// A microfacet conductor whose lobe is stretched along u or v.
+    /// A microfacet fresnel_conductor whose lobe is stretched along u or v.
     BrushedConductor(Conductor, ConductorBxdf<true, false>, kept: Box<BxdfPacket<ConductorBxdf<true, false>>>),
-    /// A conductor with the Beckmann distribution, whose lobe may be stretched along u or v.
+    /// A fresnel_conductor with the Beckmann distribution, whose lobe may be stretched along u or v.
     BeckmannConductor(Conductor, ConductorBxdf<true, true>, kept: Box<BxdfPacket<ConductorBxdf<true, true>>>),
     /// A diffuse base under a microfacet coat.
     Plastic(Plastic, PlasticBxdf<false>, kept: Box<BxdfPacket<PlasticBxdf<false>>>),
@@ -429,9 +429,9 @@ kinds! {
     CoatedPhong(Box<CoatedMaterial<Phong>>, CoatedBxdf<PhongBxdf>, kept: Box<BxdfPacket<CoatedBxdf<PhongBxdf>>>),
     /// Translucent Phong under a clear coat.
     CoatedTranslucent(Box<CoatedMaterial<TranslucentPhong>>, CoatedBxdf<TranslucentBxdf<false>>, kept: Box<BxdfPacket<CoatedBxdf<TranslucentBxdf<false>>>>),
-    /// A conductor under a clear coat, brushed or not.
+    /// A fresnel_conductor under a clear coat, brushed or not.
     CoatedConductor(Box<CoatedMaterial<Conductor>>, CoatedBxdf<ConductorBxdf<true, false>>, kept: Box<BxdfPacket<CoatedBxdf<ConductorBxdf<true, false>>>>),
-    /// A conductor with the Beckmann distribution under a clear coat.
+    /// A fresnel_conductor with the Beckmann distribution under a clear coat.
     CoatedBeckmannConductor(Box<CoatedMaterial<Conductor>>, CoatedBxdf<ConductorBxdf<true, true>>, kept: Box<BxdfPacket<CoatedBxdf<ConductorBxdf<true, true>>>>),
     /// Plastic under a clear coat.
     CoatedPlastic(Box<CoatedMaterial<Plastic>>, CoatedBxdf<PlasticBxdf<false>>, kept: Box<BxdfPacket<CoatedBxdf<PlasticBxdf<false>>>>),

@@ -8,9 +8,9 @@ use crate::math::Vec3;
 use crate::math::lanes::{F32x16, Vec3x16};
 
 /// A packet of surfaces, none of them set at first.
-pub struct TestPacket<B: Bxdf>(pub BxdfPacket<B>);
+pub struct OutOfLineTestPacket<B: Bxdf>(pub BxdfPacket<B>);
 
-impl<B: Bxdf> TestPacket<B> {
+impl<B: Bxdf> OutOfLineTestPacket<B> {
     #[inline(never)]
     pub fn empty() -> Self {
         let mut row = BxdfPacket::<B>::default();

@@ -81,7 +81,7 @@ impl ImageTexture {
     /// The linear value at the given texture coordinates. v = 0 is the bottom row. Non-finite coordinates are
     /// treated as 0.
     pub fn lookup(&self, at: &TexturePoint) -> Vec3 {
-        let tiles = self.mapping.point(at);
+        let tiles = self.mapping.map_point(at);
         let value = self.lookup_transformed_uv(tiles, || self.fractional_mip_level(at));
         self.factor.map_or(value, |factor| factor.apply(value))
     }
@@ -101,7 +101,7 @@ impl ImageTexture {
     /// Slopes of the red channel along u and v. They are central differences over one texel of the image or,
     /// with mip levels, over one texel of the level chosen by the footprint.
     pub fn slopes(&self, at: &TexturePoint) -> Vec2 {
-        let tiles = self.mapping.point(at);
+        let tiles = self.mapping.map_point(at);
         let level = match (self.filter, &self.mipmaps) {
             (TextureFilter::Mipmap, Some(mipmaps)) => {
                 self.fractional_mip_level(at).min(mipmaps.reduced_level_count() as f32)
@@ -115,7 +115,7 @@ impl ImageTexture {
         let changes =
             Vec2::new(change(DVec2::new(steps.x * 0.5, 0.0)), change(DVec2::new(0.0, steps.y * 0.5)));
         // Rotate the gradient from image coordinates back to surface coordinates.
-        self.mapping.slopes_along_uv(changes.as_dvec2() / steps)
+        self.mapping.texture_slopes_to_uv(changes.as_dvec2() / steps)
     }
 
     /// Converts slopes in the image to slopes along the texture's own coordinates. [`Wrap::Mirror`] may flip
@@ -124,7 +124,7 @@ impl ImageTexture {
         if self.wrap != Wrap::Mirror {
             return slopes;
         }
-        let tiles = self.mapping.point(at);
+        let tiles = self.mapping.map_point(at);
         slopes * Vec2::from([tiles.x, tiles.y].map(|tile| mirror_sign(tile) as f32))
     }
 
@@ -137,7 +137,7 @@ impl ImageTexture {
     #[inline(always)]
     pub fn lookup_packet(&self, uv: &[[f64; PACKET_SIZE]; 2]) -> Vec3x16 {
         let mut row = match &self.mapping.moved {
-            None => self.lookup_packet_with_repeat(uv, self.mapping.repeat.as_dvec2()),
+            None => self.lookup_packet_with_uv_scale(uv, self.mapping.repeat.as_dvec2()),
             Some(_) => self.transform_and_lookup_packet(uv),
         };
         if let Some(factor) = self.factor {
@@ -153,16 +153,16 @@ impl ImageTexture {
     #[cold]
     #[inline(never)]
     fn transform_and_lookup_packet(&self, uv: &[[f64; PACKET_SIZE]; 2]) -> Vec3x16 {
-        self.lookup_packet_with_repeat(&self.mapping.map_packet(uv), DVec2::ONE)
+        self.lookup_packet_with_uv_scale(&self.mapping.map_packet(uv), DVec2::ONE)
     }
 
     /// [`ImageTexture::lookup_packet`] at coordinates scaled by `repeat`.
     #[inline(always)]
-    fn lookup_packet_with_repeat(&self, uv: &[[f64; PACKET_SIZE]; 2], repeat: DVec2) -> Vec3x16 {
+    fn lookup_packet_with_uv_scale(&self, uv: &[[f64; PACKET_SIZE]; 2], repeat: DVec2) -> Vec3x16 {
         let (texels, size) = (&*self.texels, float_size(&self.texels));
         let folded = [
-            self.wrap.repeat_and_fold_packet(&uv[0], repeat.x),
-            self.wrap.repeat_and_fold_packet(&uv[1], repeat.y),
+            self.wrap.scale_and_fold_packet(&uv[0], repeat.x),
+            self.wrap.scale_and_fold_packet(&uv[1], repeat.y),
         ];
         let extent = integer_size(texels);
         let (mut first, mut part) = ([[0; PACKET_SIZE]; 2], [[0.0; PACKET_SIZE]; 2]);
@@ -267,7 +267,7 @@ impl ImageTexture {
     /// The fraction of the footprint where the red channel is at least `cutoff`. In the original image, the
     /// fraction is 0 or 1. The mip levels must be computed from [`Texels::threshold_red_channel`].
     pub fn coverage_above_cutoff(&self, at: &TexturePoint, cutoff: f32) -> f32 {
-        let tiles = self.mapping.point(at);
+        let tiles = self.mapping.map_point(at);
         let folded =
             [self.wrap.fold(finite_or_zero(tiles.x)) as f32, self.wrap.fold(finite_or_zero(tiles.y)) as f32];
         let cut = |value: f32| f32::from(u8::from(value >= cutoff));

@@ -65,12 +65,18 @@ fn second_uv_set_is_used_if_present() {
     let at = TexturePoint { extra: Some(Box::new(extra)), ..TexturePoint::from_uv(DVec2::new(0.1, 0.1)) };
     let mut texture = numbered(TextureFilter::Nearest, Wrap::Repeat);
     let first = [Vec3::X, Vec3::Y];
-    assert_eq!((texture.lookup(&at).x, texture.mapping.uv_set_tangents(&at, first)), (0.0, first));
+    assert_eq!((texture.lookup(&at).x, texture.mapping.untransformed_tangents(&at, first)), (0.0, first));
     texture.mapping.moved = UvTransform::new(UvSet::Second, 0.0, DVec2::ZERO).map(Box::new);
-    assert_eq!((texture.lookup(&at).x, texture.mapping.uv_set_tangents(&at, first)), (3.0, second.tangents));
+    assert_eq!(
+        (texture.lookup(&at).x, texture.mapping.untransformed_tangents(&at, first)),
+        (3.0, second.tangents)
+    );
     assert_eq!(texture.lookup(&at.without_footprint()).x, 3.0);
     let alone = TexturePoint { extra: None, ..at };
-    assert_eq!((texture.lookup(&alone).x, texture.mapping.uv_set_tangents(&alone, first)), (0.0, first));
+    assert_eq!(
+        (texture.lookup(&alone).x, texture.mapping.untransformed_tangents(&alone, first)),
+        (0.0, first)
+    );
     // The second set is repeated, rotated, and translated like the first set.
     texture.mapping.repeat = Vec2::new(1.0, 0.5);
     texture.mapping.moved = UvTransform::new(UvSet::Second, 90.0, DVec2::new(0.5, 0.0)).map(Box::new);

@@ -20,13 +20,13 @@ impl TextureMapping {
 
     /// Repeated and transformed coordinates.
     #[inline]
-    pub fn point(&self, at: &TexturePoint) -> DVec2 {
+    pub fn map_point(&self, at: &TexturePoint) -> DVec2 {
         let repeat = self.repeat.as_dvec2();
         let Some(moved) = &self.moved else { return at.uv * repeat };
         moved.transform_point(moved.second_uv_point_if_used(at).map_or(at.uv, |second| second.uv) * repeat)
     }
 
-    /// Packet version of [`TextureMapping::point`].
+    /// Packet version of [`TextureMapping::map_point`].
     pub fn map_packet(&self, uv: &[[f64; PACKET_SIZE]; 2]) -> [[f64; PACKET_SIZE]; 2] {
         let mut row = *uv;
         for i in 0..PACKET_SIZE {
@@ -46,7 +46,7 @@ impl TextureMapping {
     /// Tangents ∂p/∂u and ∂p/∂v of the UV set used for lookups. `first` contains the tangents of the first
     /// set.
     #[inline]
-    pub fn uv_set_tangents(&self, at: &TexturePoint, first: [Vec3; 2]) -> [Vec3; 2] {
+    pub fn untransformed_tangents(&self, at: &TexturePoint, first: [Vec3; 2]) -> [Vec3; 2] {
         let second = self.moved.as_ref().and_then(|moved| moved.second_uv_point_if_used(at));
         second.map_or(first, |second| second.tangents)
     }
@@ -62,7 +62,7 @@ impl TextureMapping {
     }
 
     /// Converts slopes along the texture's own coordinates to slopes along u and v.
-    pub fn slopes_along_uv(&self, slopes: DVec2) -> Vec2 {
+    pub fn texture_slopes_to_uv(&self, slopes: DVec2) -> Vec2 {
         let slopes = self.moved.as_ref().map_or(slopes, |moved| moved.inverse_transform_vector(slopes));
         slopes.as_vec2() * self.repeat
     }

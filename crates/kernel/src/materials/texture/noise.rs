@@ -58,10 +58,10 @@ impl Noise {
     /// An octave of size s fades with smoothstep(s/w − 1), where w is the length of the footprint's longer axis:
     /// it is complete for s ≥ 2w, where it is sampled at least twice per lattice cell, and gone for s ≤ w. This
     /// clamps the number of octaves, as `FBm` of pbrt-v4 does, but also fades the first octave.
-    pub fn filtered(&self, at: &TexturePoint, is_filtered: bool) -> FilteredNoiseValue {
+    pub fn evaluate(&self, at: &TexturePoint, is_filtered: bool) -> FilteredNoiseValue {
         let (position, width) = object_position_and_width(at, is_filtered);
         let (mut value, mut removed_variance) = (0.0, 0.0);
-        for octave in self.octaves(width) {
+        for octave in self.weighted_octaves(width) {
             removed_variance += octave.weight * octave.weight * (1.0 - octave.fade * octave.fade) * VARIANCE;
             if octave.fade > 0.0 {
                 value += octave.weight * octave.fade * octave.cell(position).value();
@@ -74,7 +74,7 @@ impl Noise {
     pub fn value_gradient(&self, at: &TexturePoint, is_filtered: bool) -> Vec3 {
         let (position, width) = object_position_and_width(at, is_filtered);
         let mut gradient = Vec3::ZERO;
-        for octave in self.octaves(width).filter(|octave| octave.fade > 0.0) {
+        for octave in self.weighted_octaves(width).filter(|octave| octave.fade > 0.0) {
             let slope = octave.weight * octave.fade * (1.0 / octave.size) as f32;
             gradient += octave.cell(position).gradient() * slope;
         }
@@ -82,7 +82,7 @@ impl Noise {
     }
 
     /// The octaves with their weights, for a footprint of this width.
-    fn octaves(&self, width: f64) -> impl Iterator<Item = Octave> {
+    fn weighted_octaves(&self, width: f64) -> impl Iterator<Item = Octave> {
         let total = 2.0 - 1.0 / f64::from(1_u32 << (self.octaves - 1));
         let seed = u64::from(self.seed) << 8;
         let size = self.size;
@@ -118,7 +118,7 @@ struct Octave {
 }
 
 /// A lattice cell, and a point in it.
-struct Cell {
+struct LatticeCell {
     /// The point, in [0, 1]³.
     at: Vec3,
     /// Gradients at the corners. Bits 0, 1 and 2 of the index are the offsets along x, y and z.
@@ -127,7 +127,7 @@ struct Cell {
 
 impl Octave {
     /// The cell around a point. Non-finite points are treated as 0.
-    fn cell(&self, position: DVec3) -> Cell {
+    fn cell(&self, position: DVec3) -> LatticeCell {
         // Odd factors make neighboring lattice points differ in many bits.
         const FACTORS: [u64; 3] = [0x9e37_79b9_7f4a_7c15, 0xc2b2_ae3d_27d4_eb4f, 0x1656_67b1_9e37_79f9];
         let position = position / self.size;
@@ -140,11 +140,11 @@ impl Octave {
             let bits = hash(key.wrapping_add(step(0)).wrapping_add(step(1)).wrapping_add(step(2)));
             GRADIENTS[(((bits >> 32) * GRADIENTS.len() as u64) >> 32) as usize]
         };
-        Cell { at: (position - low).as_vec3(), gradients: std::array::from_fn(gradient) }
+        LatticeCell { at: (position - low).as_vec3(), gradients: std::array::from_fn(gradient) }
     }
 }
 
-impl Cell {
+impl LatticeCell {
     /// Values of the corners' linear functions.
     fn corner_dot_products(&self) -> [f32; 8] {
         std::array::from_fn(|corner| {
@@ -204,7 +204,7 @@ mod tests {
     }
 
     fn value(noise: &Noise, position: DVec3) -> f32 {
-        noise.filtered(&point(position, 0.0), false).value
+        noise.evaluate(&point(position, 0.0), false).value
     }
 
     /// Random points in a cube with an edge length of 100 around 0.
@@ -279,7 +279,7 @@ mod tests {
                 let by_ramp = |a: &Vec3, b: &Vec3| a.dot(offset).total_cmp(&b.dot(offset));
                 GRADIENTS.into_iter().max_by(by_ramp).expect("gradients")
             });
-            most = most.max(Cell { at, gradients }.value());
+            most = most.max(LatticeCell { at, gradients }.value());
         }
         assert!((0.995..=1.0).contains(&most), "{most}");
     }
@@ -318,16 +318,16 @@ mod tests {
         let noise = octaves(3);
         let at = DVec3::new(0.3, 0.4, 0.7);
         let octave = |number: usize, fade: f64| {
-            let octave = noise.octaves(0.0).nth(number).expect("an octave");
+            let octave = noise.weighted_octaves(0.0).nth(number).expect("an octave");
             f64::from(octave.weight * octave.cell(at).value()) * fade
         };
         let above: f64 = 0.5 / 0.3 - 1.0;
         let expected = octave(0, 1.0) + octave(1, above * above * (3.0 - 2.0 * above));
-        let found = noise.filtered(&point(at, 0.3), true);
+        let found = noise.evaluate(&point(at, 0.3), true);
         assert!((f64::from(found.value) - expected).abs() < 1e-6, "{found:?} {expected}");
         let all = octave(0, 1.0) + octave(1, 1.0) + octave(2, 1.0);
         for (width, is_filtered, expected) in [(0.1, true, all), (0.3, false, all), (1.0, true, 0.0)] {
-            let found = f64::from(noise.filtered(&point(at, width), is_filtered).value);
+            let found = f64::from(noise.evaluate(&point(at, width), is_filtered).value);
             assert!((found - expected).abs() < 1e-6, "{width}: {found} {expected}");
         }
     }
@@ -339,7 +339,7 @@ mod tests {
         };
         let seed = |seed: u32| move |at: DVec3| value(&Noise { size: 1.0, octaves: 1, seed }, at);
         let second = |at: DVec3| {
-            let octave = octaves(2).octaves(0.0).nth(1).expect("an octave");
+            let octave = octaves(2).weighted_octaves(0.0).nth(1).expect("an octave");
             octave.cell(at * 0.5).value()
         };
         // The standard error of a correlation of 0 is 1/√20,000 = 0.007.

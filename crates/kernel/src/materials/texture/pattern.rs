@@ -44,7 +44,7 @@ impl Pattern {
         match self {
             Self::Checker(checker) => checker.second_color_share(at, is_filtered),
             Self::Bands(bands) => bands.second_color_share(at, is_filtered),
-            Self::Noise(noise) => share_from_noise(noise.filtered(at, is_filtered).value),
+            Self::Noise(noise) => share_from_noise(noise.evaluate(at, is_filtered).value),
         }
     }
 
@@ -62,7 +62,7 @@ impl Pattern {
                 mix(cut(first), cut(second), self.second_color_share(at, is_filtered))
             }
             Self::Noise(noise) => {
-                let FilteredNoiseValue { value, removed_variance } = noise.filtered(at, is_filtered);
+                let FilteredNoiseValue { value, removed_variance } = noise.evaluate(at, is_filtered);
                 let mean = mix(first, second, share_from_noise(value));
                 // Approximate the distribution of the faded octaves by a parabola with the same variance, which
                 // is a fifth of its squared half width.

@@ -38,7 +38,7 @@ impl Checker {
         let (point, extents) = point_and_extents(&self.mapping, at, is_filtered);
         let [x, y] = [square_wave(point.x, extents.x), square_wave(point.y, extents.y)];
         let slopes = DVec2::new(wave_slope(point.x, extents.x) * y, wave_slope(point.y, extents.y) * x);
-        self.mapping.slopes_along_uv(slopes * -0.5)
+        self.mapping.texture_slopes_to_uv(slopes * -0.5)
     }
 
     /// Number of cells per unit of u and v.
@@ -57,7 +57,7 @@ impl Bands {
     /// Slopes of [`Bands::second_color_share`] along u and v.
     pub fn slopes(&self, at: &TexturePoint, is_filtered: bool) -> Vec2 {
         let (point, extents) = point_and_extents(&self.mapping, at, is_filtered);
-        self.mapping.slopes_along_uv(DVec2::new(wave_slope(point.x, extents.x) * -0.5, 0.0))
+        self.mapping.texture_slopes_to_uv(DVec2::new(wave_slope(point.x, extents.x) * -0.5, 0.0))
     }
 
     /// Number of bands per unit of u and v.
@@ -69,7 +69,7 @@ impl Bands {
 /// The point in repetitions, and the extents of the box to average over.
 fn point_and_extents(mapping: &TextureMapping, at: &TexturePoint, is_filtered: bool) -> (DVec2, DVec2) {
     let extents = if is_filtered { mapping.footprint_extents(at) } else { DVec2::ZERO };
-    (mapping.point(at), extents)
+    (mapping.map_point(at), extents)
 }
 
 /// Converts a wave between 1 (the first tone) and −1 (the second) to the fraction of the second tone.

@@ -18,7 +18,7 @@ choice! {
 impl Wrap {
     /// Multiplies coordinates by `repeat` and folds them into [0, 1].
     #[inline(always)]
-    pub(super) fn repeat_and_fold_packet(self, x: &[f64; PACKET_SIZE], repeat: f64) -> F32x16 {
+    pub(super) fn scale_and_fold_packet(self, x: &[f64; PACKET_SIZE], repeat: f64) -> F32x16 {
         let mut folded = [0.0; PACKET_SIZE];
         macro_rules! by {
             ($wrap:expr) => {

@@ -44,7 +44,7 @@ impl MeshData {
 
     /// Orients the triangles as pbrt does. The front of a triangle is on the side of its vertex normals or,
     /// if there are none, follows its winding. `is_reversed` flips the front and the normals.
-    pub(crate) fn orient(&mut self, is_reversed: bool) {
+    pub(crate) fn orient_triangles_like_pbrt(&mut self, is_reversed: bool) {
         if is_reversed {
             self.normals.iter_mut().for_each(|normal| *normal = -*normal);
         }
@@ -98,7 +98,10 @@ impl MeshData {
 
     /// Tessellates a parametric surface as a grid of `columns` by `rows` cells. `surface` returns the
     /// position and normal at (u, v).
-    pub(crate) fn from_surface([columns, rows]: [u32; 2], surface: impl Fn(DVec2) -> (DVec3, DVec3)) -> Self {
+    pub(crate) fn tessellate_surface(
+        [columns, rows]: [u32; 2],
+        surface: impl Fn(DVec2) -> (DVec3, DVec3),
+    ) -> Self {
         let mut mesh = Self::default();
         for row in 0..=rows {
             for column in 0..=columns {
@@ -162,7 +165,7 @@ impl MeshData {
     }
 
     /// Encodes the mesh as binary PLY, with positions in double precision.
-    pub(crate) fn encode(&self) -> Vec<u8> {
+    pub(crate) fn encode_ply(&self) -> Vec<u8> {
         let (has_normals, has_uvs) = (!self.normals.is_empty(), !self.uvs.is_empty());
         let has_colors = !self.colors.is_empty();
         let mut header = format!(
@@ -233,7 +236,7 @@ mod tests {
         ] {
             let mut mesh = triangle();
             mesh.normals = normal.map_or(Vec::new(), |normal| vec![normal; 3]);
-            mesh.orient(is_reversed);
+            mesh.orient_triangles_like_pbrt(is_reversed);
             assert_eq!(mesh.triangle_cross_product(mesh.triangles[0]), expected, "{normal:?} {is_reversed}");
             assert!(mesh.normals.iter().all(|normal| normal.dot(expected) > 0.0));
         }
@@ -241,7 +244,7 @@ mod tests {
 
     #[test]
     fn surfaces_face_along_their_normals() {
-        let mesh = MeshData::from_surface([3, 2], |uv| (DVec3::new(uv.x, uv.y, 0.0), DVec3::Z));
+        let mesh = MeshData::tessellate_surface([3, 2], |uv| (DVec3::new(uv.x, uv.y, 0.0), DVec3::Z));
         assert_eq!((mesh.positions.len(), mesh.triangles.len()), (12, 12));
         assert!(mesh.triangles.iter().all(|triangle| mesh.triangle_cross_product(*triangle).z > 0.0));
     }

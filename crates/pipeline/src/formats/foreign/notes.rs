@@ -57,7 +57,7 @@ impl NoteCollector {
     }
 
     /// Adds a substitution.
-    pub(crate) fn substitute(&mut self, subject: &str, text: &str, span: Range<usize>) {
+    pub(crate) fn note_substitution(&mut self, subject: &str, text: &str, span: Range<usize>) {
         self.add(NoteKind::Substitution, subject, text, span);
     }
 
@@ -99,8 +99,8 @@ mod tests {
         sources.add(Path::new("a.xml"), "one\ntwo\n".into());
         let second = sources.add(Path::new("b.xml"), "three\nfour".into());
         notes.note("`bump`", "fades", 0..3);
-        notes.substitute("`curve`", "skipped", 4..7);
-        notes.substitute("`curve`", "skipped", 0..3);
+        notes.note_substitution("`curve`", "skipped", 4..7);
+        notes.note_substitution("`curve`", "skipped", 0..3);
         notes.substitute_changing_lighting("`hair`", "diffuse", second + 6..second + 10);
         let (notes, substitutions) = notes.into_diagnostics(&sources);
         assert_eq!(notes.iter().map(|one| &*one.message).collect::<Vec<_>>(), ["`bump`: fades"]);

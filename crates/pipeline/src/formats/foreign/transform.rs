@@ -71,7 +71,7 @@ pub(crate) fn is_mirroring(matrix: &DMat4) -> bool {
 
 /// Camera-to-world matrix of a camera at `origin` that looks at `target`. x points to the left of the image,
 /// y up and z forward. Returns `None` if `origin`, `target` and `up` do not define an orientation.
-pub(crate) fn look_at_left(origin: DVec3, target: DVec3, up: DVec3) -> Option<DMat4> {
+pub(crate) fn look_at_with_x_left(origin: DVec3, target: DVec3, up: DVec3) -> Option<DMat4> {
     let forward = (target - origin).try_normalize()?;
     let left = up.cross(forward).try_normalize()?;
     let up = forward.cross(left);
@@ -94,10 +94,10 @@ mod tests {
 
     #[test]
     fn look_at_has_x_on_the_left() {
-        let camera = look_at_left(DVec3::ZERO, DVec3::NEG_Z, DVec3::Y).expect("a camera");
+        let camera = look_at_with_x_left(DVec3::ZERO, DVec3::NEG_Z, DVec3::Y).expect("a camera");
         assert_eq!(camera.transform_vector3(DVec3::X), DVec3::NEG_X);
         assert!(!is_mirroring(&camera));
-        assert!(look_at_left(DVec3::ZERO, DVec3::Y, DVec3::Y).is_none());
+        assert!(look_at_with_x_left(DVec3::ZERO, DVec3::Y, DVec3::Y).is_none());
     }
 
     #[test]

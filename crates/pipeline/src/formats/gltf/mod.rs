@@ -244,7 +244,7 @@ impl SceneBuilder<'_> {
                 self.document.set("part", instance.part as f64);
             }
             SceneAssetLocation::Folder(_) => {
-                let name = self.add_exported_file(GltfPartOrImage::Part(instance.part), base, "ply");
+                let name = self.ensure_exported_file(GltfPartOrImage::Part(instance.part), base, "ply");
                 self.document.set("file", name);
             }
         }
@@ -280,7 +280,7 @@ impl SceneBuilder<'_> {
     }
 
     /// Returns the file name for `content`, adding a file if the content is new.
-    fn add_exported_file(&mut self, content: GltfPartOrImage, wanted: &str, ending: &str) -> String {
+    fn ensure_exported_file(&mut self, content: GltfPartOrImage, wanted: &str, ending: &str) -> String {
         if let Some(known) = self.names.get(&content) {
             return known.clone();
         }
@@ -336,7 +336,7 @@ impl SceneBuilder<'_> {
                     Err(_) => "png".to_owned(),
                 };
                 let wanted = self.image_stem(image);
-                let name = self.add_exported_file(GltfPartOrImage::Image(image), &wanted, &ending);
+                let name = self.ensure_exported_file(GltfPartOrImage::Image(image), &wanted, &ending);
                 TextureFileReference { file: name, image: None }
             }
         }

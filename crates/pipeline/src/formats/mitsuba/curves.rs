@@ -93,7 +93,7 @@ fn direction_around(tangent: DVec3, u: f64) -> DVec3 {
 
 /// The tube of one segment of a spline.
 fn spline_segment_tube(points: &[ControlPoint; 4]) -> MeshData {
-    MeshData::from_surface([SIDES, RINGS], |uv| {
+    MeshData::tessellate_surface([SIDES, RINGS], |uv| {
         let at = spline_point(points, uv.y);
         let out = direction_around(at.tangent.normalize_or(DVec3::Z), uv.x) * at.radius;
         let bend = at.tangent.length_squared() - out.dot(at.curvature);
@@ -110,7 +110,7 @@ fn linear_segment_tube([start, end]: [ControlPoint; 2]) -> MeshData {
     // Angle between the normal on the cone and the plane across the axis.
     let tilt = libm::asin(lift);
     let rows = 2 * CAP_RINGS + 1;
-    MeshData::from_surface([SIDES, rows], |uv| {
+    MeshData::tessellate_surface([SIDES, rows], |uv| {
         let row = (uv.y * f64::from(rows)).round();
         let cap = f64::from(CAP_RINGS);
         let (sphere, angle) = if row <= cap {
@@ -155,7 +155,7 @@ fn tubes(curves: &[Vec<ControlPoint>], is_spline: bool) -> Option<MeshData> {
         segment.uvs.iter_mut().for_each(|uv| *uv = DVec2::new(uv.x, along(uv.y)));
         tubes.append(segment);
     }
-    tubes.orient(false);
+    tubes.orient_triangles_like_pbrt(false);
     Some(tubes)
 }
 

@@ -15,7 +15,7 @@ const SECTORS: u32 = 512;
 
 /// A disk with Mitsuba's texture coordinates: u is the radius, and v is the angle from +x divided by 2π.
 fn polar_disk(normal: DVec3) -> MeshData {
-    let mut mesh = MeshData::from_surface([1, SECTORS], |uv| {
+    let mut mesh = MeshData::tessellate_surface([1, SECTORS], |uv| {
         let angle = TAU * uv.y;
         (DVec3::new(libm::cos(angle), libm::sin(angle), 0.0) * uv.x, normal)
     });
@@ -29,7 +29,7 @@ fn polar_disk(normal: DVec3) -> MeshData {
             }
         }
     }
-    mesh.orient(false);
+    mesh.orient_triangles_like_pbrt(false);
     mesh
 }
 

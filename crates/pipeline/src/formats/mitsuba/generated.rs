@@ -46,7 +46,7 @@ impl<'a> SceneReader<'a> {
             self.notes.note("a mesh without area", "left out", object.span.clone());
             return false;
         }
-        let file = self.add_generated_file(&object.plugin, "ply", mesh.encode());
+        let file = self.add_generated_file(&object.plugin, "ply", mesh.encode_ply());
         self.start_shape(object, target, "mesh", material);
         self.document.set("file", file);
         if mesh.normals.is_empty() {

@@ -219,7 +219,7 @@ impl<'a> SceneReader<'a> {
             self.refuse(object, "grids with so large surfaces");
             return false;
         };
-        mesh.orient(false);
+        mesh.orient_triangles_like_pbrt(false);
         self.notes.note("`sdfgrid`", "a mesh of triangles a third of a voxel wide", object.span.clone());
         self.add_generated_mesh(mesh, object, target, material, &matrix)
     }
@@ -260,7 +260,7 @@ mod tests {
     fn surfaces_of_spheres_are_closed() {
         let grid = DistanceGrid::parse(&file(|at| (at - DVec3::splat(0.5)).length() - 0.4)).expect("a grid");
         let mut mesh = grid.surface(true).expect("a mesh");
-        mesh.orient(false);
+        mesh.orient_triangles_like_pbrt(false);
         let corner = |vertex: u32| mesh.positions[vertex as usize];
         // The volume of a closed surface by the divergence theorem; a voxel is about 0.14 wide.
         let volume: f64 = mesh

@@ -288,7 +288,7 @@ impl<'a> SceneReader<'a> {
         let plugin = integrator.plugin.as_str();
         if self.boolean(integrator, "hide_emitters", false) {
             let text = "emitters stay visible to the camera";
-            self.notes.substitute("`hide_emitters`", text, integrator.span.clone());
+            self.notes.note_substitution("`hide_emitters`", text, integrator.span.clone());
         }
         match plugin {
             "direct" | "direct_projective" => {
@@ -378,7 +378,7 @@ impl<'a> SceneReader<'a> {
             "perspective" | "thinlens" | "perspective_rdist" => {
                 if plugin == "perspective_rdist" {
                     let text = "rendered without lens distortion";
-                    self.notes.substitute("`perspective_rdist`", text, sensor.span.clone());
+                    self.notes.note_substitution("`perspective_rdist`", text, sensor.span.clone());
                 }
                 let half_height = self.half_height_of_perspective(sensor, window) * height / depth;
                 let fov = 2.0 * libm::atan(half_height * window.height_fraction()).to_degrees();

@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::property::{PropertyValue, SpectrumValue, TransformValue};
 use super::xml::{Attribute, Element, truncate_for_message};
 use crate::formats::foreign::spectra::SampledSpectrum;
-use crate::formats::foreign::transform::{look_at_left, rotation_about_raw_axis};
+use crate::formats::foreign::transform::{look_at_with_x_left, rotation_about_raw_axis};
 use crate::math::color::srgb_to_linear;
 use crate::math::{DMat4, DVec3};
 use crate::scene::nearest::nearest_name;
@@ -245,7 +245,7 @@ fn parse_look_at(step: &Element) -> Result<(DMat4, Option<DVec3>), ValueError> {
         .try_normalize()
         .ok_or_else(|| ValueError::new(&step.span, "`origin` and `target` are the same point"))?;
     let up = if up == DVec3::ZERO { perpendicular_up(forward) } else { up };
-    match look_at_left(origin, target, up) {
+    match look_at_with_x_left(origin, target, up) {
         Some(matrix) => Ok((matrix, Some(target))),
         None => Err(ValueError::new(&step.span, "`up` is parallel to the viewing direction")),
     }

@@ -102,7 +102,7 @@ impl PbrtConverter<'_> {
         if !is_exact {
             let text = "their combination repeats after one unit of u and v";
             let span = first_file.map_or(0..0, |file| file.span.clone());
-            self.notes.substitute("textures with different scales", text, span);
+            self.notes.note_substitution("textures with different scales", text, span);
         }
         let is_number = usage != PbrtTextureUse::Color;
         let pixels = bake(node, &images, &domain, usage, self.token);

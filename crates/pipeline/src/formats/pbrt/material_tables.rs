@@ -102,7 +102,7 @@ impl PbrtConverter<'_> {
                 let has_alpha = properties.alpha.is_some();
                 if is_glass && has_alpha {
                     let text = "it is ignored, and the surface has no holes";
-                    self.notes.substitute("`alpha` of a dielectric", text, entity.span());
+                    self.notes.note_substitution("`alpha` of a dielectric", text, entity.span());
                 }
                 if is_glass && let Some(tint) = properties.tint {
                     keys.push(("tint", shorten_color(tint)));
@@ -124,7 +124,11 @@ impl PbrtConverter<'_> {
             return LoweredMaterial::Invisible;
         }
         let span = 0..0;
-        self.notes.substitute("a light with the material `interface`", "its surface is black", span.clone());
+        self.notes.note_substitution(
+            "a light with the material `interface`",
+            "its surface is black",
+            span.clone(),
+        );
         let mut keys: TableEntries = vec![("diffuse", 0.0.into())];
         let needs_uv = self.push_emission_and_opacity_keys(&mut keys, properties, false);
         let name = self.add_material_table(keys, name, &span);

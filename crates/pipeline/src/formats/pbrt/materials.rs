@@ -179,7 +179,7 @@ impl MaterialReader<'_, '_> {
         let span = self.parameters.span_of(name);
         if is_dispersive {
             let text = "one index of refraction is used for all wavelengths";
-            self.writer.notes.substitute("dispersion", text, span.clone());
+            self.writer.notes.note_substitution("dispersion", text, span.clone());
         }
         if (0.1..=10.0).contains(&ior) {
             return Ok(ior);
@@ -203,7 +203,7 @@ impl MaterialReader<'_, '_> {
             if along_u != along_v {
                 let text = "one of the textures is used in both directions";
                 let span = self.parameters.span_of(u);
-                self.writer.notes.substitute("roughness textures along u and v", text, span);
+                self.writer.notes.note_substitution("roughness textures along u and v", text, span);
             }
             let node = if along_u.as_constant().is_none() { along_u } else { along_v };
             return Ok(Roughness::Textured(self.writer.roughness_node(node, is_remapped)));
@@ -217,7 +217,7 @@ impl MaterialReader<'_, '_> {
         let size = ((1.0 - ratio) / 0.9).min(1.0);
         if ratio < 0.099 {
             let text = "the highlight is only 10 times as long as it is wide";
-            self.writer.notes.substitute("strong anisotropy", text, self.parameters.span_of(u));
+            self.writer.notes.note_substitution("strong anisotropy", text, self.parameters.span_of(u));
         }
         let anisotropy = if alpha_v > alpha_u { -size } else { size };
         Ok(Roughness::Constant { roughness, anisotropy: if ratio > 0.9999 { 0.0 } else { anisotropy } })
@@ -230,7 +230,7 @@ impl MaterialReader<'_, '_> {
                 if anisotropy != 0.0 {
                     let text = "the mean roughness is used in both directions";
                     let span = self.parameters.span_of(names[1]);
-                    self.writer.notes.substitute("anisotropy of a dielectric", text, span);
+                    self.writer.notes.note_substitution("anisotropy of a dielectric", text, span);
                 }
                 self.keys.push((key, roughness.into()));
             }

@@ -41,7 +41,7 @@ impl PbrtConverter<'_> {
         if parameters.find("displacement").is_some() {
             let text = "the surface is not displaced";
             let span = parameters.span_of("displacement");
-            self.notes.substitute("`displacement` of a shape", text, span);
+            self.notes.note_substitution("`displacement` of a shape", text, span);
         }
         parameters.ignore(&["edgelength", "displacement.edgelength"]);
         if self.tolerate_if_missing(&file, "mesh", "skipped") {

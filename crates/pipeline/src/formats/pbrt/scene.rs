@@ -211,7 +211,7 @@ impl<'a> PbrtConverter<'a> {
     pub(super) fn still_transform(&mut self, transform: [DMat4; 2], span: Range<usize>) -> DMat4 {
         let [start, end] = transform;
         if start != end {
-            self.notes.substitute("motion", "only the transform at the start time is used", span);
+            self.notes.note_substitution("motion", "only the transform at the start time is used", span);
         }
         start
     }

@@ -58,7 +58,7 @@ impl PbrtConverter<'_> {
         let white = parameters.float("whitebalance", 0.0)?;
         if white != 0.0 && (white - 6500.0).abs() > 50.0 {
             let text = "the image is not white balanced";
-            self.notes.substitute("`whitebalance`", text, parameters.span_of("whitebalance"));
+            self.notes.note_substitution("`whitebalance`", text, parameters.span_of("whitebalance"));
         }
         if parameters.optional_float("maxcomponentvalue")?.is_some() {
             let text = "samples are not clamped, so fireflies may remain";
@@ -268,7 +268,7 @@ impl PbrtConverter<'_> {
             && parameters.string("mapping")?.is_none_or(|mapping| mapping.text != "equirectangular")
         {
             let text = "the panorama is equirectangular";
-            self.notes.substitute("`mapping` \"equalarea\" of a camera", text, entity.span());
+            self.notes.note_substitution("`mapping` \"equalarea\" of a camera", text, entity.span());
         }
         parameters.ignore(&["shutteropen", "shutterclose", "mapping"]);
         parameters.check_all_used()?;
@@ -303,7 +303,7 @@ impl PbrtConverter<'_> {
         let shape = (window[1] - window[0]) / (window[3] - window[2]);
         if (shape / pixels - 1.0).abs() > 1e-3 {
             let text = "pixels are square, so the window is cropped or extended at the sides";
-            self.notes.substitute("non-square pixels", text, parameters.span.clone());
+            self.notes.note_substitution("non-square pixels", text, parameters.span.clone());
         }
         Ok(window)
     }

@@ -142,11 +142,11 @@ impl PbrtConverter<'_> {
             self.notes.note("a mesh without area", "skipped", placement.span.clone());
             return;
         }
-        data.orient(placement.is_reversed);
+        data.orient_triangles_like_pbrt(placement.is_reversed);
         if placement.needs_uv {
             data.add_default_uvs();
         }
-        let name = self.add_generated_file(stem, "ply", data.encode());
+        let name = self.add_generated_file(stem, "ply", data.encode_ply());
         self.start_shape_table("mesh", placement);
         self.document.set("file", name);
         if data.normals.is_empty() {
@@ -181,8 +181,8 @@ impl PbrtConverter<'_> {
             self.notes.note("a mesh without area", "skipped", placement.span.clone());
             return Ok(());
         }
-        data.orient(placement.is_reversed);
-        let name = self.add_generated_file("loopsubdiv", "ply", data.encode());
+        data.orient_triangles_like_pbrt(placement.is_reversed);
+        let name = self.add_generated_file("loopsubdiv", "ply", data.encode_ply());
         self.start_shape_table("mesh", placement);
         self.document.set("file", name);
         self.document.set("subdivide", levels.min(most) as f64);
@@ -338,7 +338,7 @@ fn bilinear_mesh(parameters: &Parameters) -> PbrtResult<MeshData> {
         let is_flat =
             (p10 + p01 - p00 - p11).length() <= 1e-6 * (p11 - p00).length().max((p10 - p01).length());
         let cells = if is_flat { 1 } else { CELLS };
-        let mut mesh = MeshData::from_surface([cells, cells], |uv| {
+        let mut mesh = MeshData::tessellate_surface([cells, cells], |uv| {
             let along_u = (p10 - p00).lerp(p11 - p01, uv.y);
             let along_v = (p01 - p00).lerp(p11 - p10, uv.x);
             let normal = match normals.is_empty() {
@@ -407,17 +407,17 @@ fn tessellate_round_shape(kind: &str, round: &RoundShape) -> MeshData {
     match kind {
         "sphere" => {
             let [low, high] = round.z.map(|z| libm::acos((z / round.radius).clamp(-1.0, 1.0)));
-            MeshData::from_surface([ROUND_CELLS, ROUND_CELLS / 2], |uv| {
+            MeshData::tessellate_surface([ROUND_CELLS, ROUND_CELLS / 2], |uv| {
                 let (sine, cosine) = libm::sincos(low + (high - low) * uv.y);
                 let normal = circle(uv.x) * sine + DVec3::Z * cosine;
                 (normal * round.radius, normal)
             })
         }
-        "disk" => MeshData::from_surface([ROUND_CELLS, 1], |uv| {
+        "disk" => MeshData::tessellate_surface([ROUND_CELLS, 1], |uv| {
             let radius = round.radius + (round.inner_radius - round.radius) * uv.y;
             (circle(uv.x) * radius + DVec3::Z * round.z[0], DVec3::Z)
         }),
-        _ => MeshData::from_surface([ROUND_CELLS, 1], |uv| {
+        _ => MeshData::tessellate_surface([ROUND_CELLS, 1], |uv| {
             let normal = circle(uv.x);
             (normal * round.radius + DVec3::Z * (round.z[0] + (round.z[1] - round.z[0]) * uv.y), normal)
         }),

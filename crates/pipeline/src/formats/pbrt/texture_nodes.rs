@@ -303,13 +303,13 @@ impl<'a> TextureResolver<'a> {
                 let parts = [part(self, "tex1", 1.0)?, part(self, "tex2", 0.0)?];
                 if parameters.integer("dimension", 2, 2..=3)? == 3 {
                     let text = "its cells follow the texture coordinates instead of positions in space";
-                    notes.substitute("texture `checkerboard` with 3 dimensions", text, entity.span());
+                    notes.note_substitution("texture `checkerboard` with 3 dimensions", text, entity.span());
                 }
                 TextureNode::Checker(uv_mapping(texture, notes)?, Arc::new(parts))
             }
             "dots" => {
                 let (inside, outside) = (part(self, "inside", 1.0)?, part(self, "outside", 0.0)?);
-                notes.substitute("texture `dots`", "their mean is used", entity.span());
+                notes.note_substitution("texture `dots`", "their mean is used", entity.span());
                 uv_mapping(texture, notes)?;
                 // Half of the cells contain a dot of radius 0.35.
                 let share = std::f64::consts::PI * 0.35 * 0.35 * 0.5;
@@ -374,7 +374,11 @@ fn uv_mapping(texture: &PlacedEntity, notes: &mut NoteCollector) -> PbrtResult<U
         None | Some("uv") => Ok(UvMapping { scale, offset }),
         Some(other @ ("spherical" | "cylindrical" | "planar")) => {
             let subject = format!("texture mapping `{other}`");
-            notes.substitute(&subject, "the shape's texture coordinates are used", texture.entity.span());
+            notes.note_substitution(
+                &subject,
+                "the shape's texture coordinates are used",
+                texture.entity.span(),
+            );
             Ok(UvMapping { scale, offset })
         }
         Some(other) => {
@@ -410,7 +414,7 @@ fn image_node(
         Some("clamp") => ImageWrap::Clamp,
         Some("black") => ImageWrap::Black,
         Some("octahedralsphere") => {
-            notes.substitute("`wrap` \"octahedralsphere\"", "the image repeats", span());
+            notes.note_substitution("`wrap` \"octahedralsphere\"", "the image repeats", span());
             ImageWrap::Repeat
         }
         Some(other) => {
@@ -425,7 +429,7 @@ fn image_node(
         None | Some("sRGB" | "srgb") => false,
         Some("linear") => is_png,
         Some(_) => {
-            notes.substitute("`encoding` with a gamma", "sRGB is used", span());
+            notes.note_substitution("`encoding` with a gamma", "sRGB is used", span());
             false
         }
     };
@@ -451,9 +455,9 @@ fn noise_node(texture: &PlacedEntity, notes: &mut NoteCollector) -> PbrtResult<T
     let subject = format!("texture `{kind}`");
     let span = texture.entity.span();
     if kind == "marble" {
-        notes.substitute(&subject, "its mean color is used", span);
+        notes.note_substitution(&subject, "its mean color is used", span);
         return Ok(TextureNode::Constant(DVec3::new(0.42, 0.42, 0.45)));
     }
-    notes.substitute(&subject, "glimt's noise is used, which has a different pattern", span);
+    notes.note_substitution(&subject, "glimt's noise is used, which has a different pattern", span);
     Ok(TextureNode::Noise { octaves, factor: if kind == "windy" { 1.0 } else { factor } })
 }

@@ -11,7 +11,7 @@ use crate::integrators::view::PathAov;
 use crate::lights::{
     EmissionModulation, EmitterObjectPacket, GeometryOfLight, Light, LightCenter, LightSamplePacket,
 };
-use crate::materials::bsdf::ratio;
+use crate::materials::bsdf::divide_lanes_or_zero;
 use crate::math::Vec3;
 use crate::math::color::luminance;
 use crate::math::lanes::{PACKET_SIZE, Simd, TRUE, Vec3x16, lane, set_lane};
@@ -81,7 +81,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
                 ShadowMode::Off => true,
             };
             // If only one sample is possible, take one. Otherwise, take the requested number.
-            let is_single = light.is_single_direction();
+            let is_single = light.has_no_angular_extent();
             let count = if is_single { 1 } else { render.shadow_samples };
             if !is_single && sampler.is_none() {
                 sampler = Some(self.row.sampler_packet(self.tile));
@@ -237,7 +237,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             add_masked_lanes(pending.active, &pending.diffuse, &mut sums.diffuse);
             return add_masked_lanes(pending.active, &pending.light, &mut sums.light);
         };
-        let fraction = self.splits_lobes.then(|| ratio(&pending.diffuse, &pending.light));
+        let fraction = self.splits_lobes.then(|| divide_lanes_or_zero(&pending.diffuse, &pending.light));
         // Aim a ray at the light's center.
         let (mut direction, mut ends) = ([[0.0; PACKET_SIZE]; 3], [-1.0; PACKET_SIZE]);
         for i in 0..PACKET_SIZE {

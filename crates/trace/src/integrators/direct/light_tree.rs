@@ -228,7 +228,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             let picked = shares.pick_packet(numbers);
             pick.lights = picked.lights;
             pick.weighed = match &without {
-                Some(without) => without.pick_probabilities(&picked),
+                Some(without) => without.probabilities_of_picks(&picked),
                 None => picked.probabilities,
             };
             pick.shares = picked.probabilities;
@@ -249,7 +249,8 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         picks: &mut [LightPicks],
     ) {
         let (row, group) = (self.row, way.count as usize);
-        let (mut cut, mut without) = (way.adaptive_tree_cut(tree), MIS.then(|| way.adaptive_tree_cut(tree)));
+        let (mut cut, mut without) =
+            (way.new_adaptive_tree_cut(tree), MIS.then(|| way.new_adaptive_tree_cut(tree)));
         for i in set_bit_lanes(self.used) {
             let plain = Receiver::with_unknown_lobe(lane(&row.from, i), lane(&row.normal, i));
             let lobe = self.receiver_lobe(i);

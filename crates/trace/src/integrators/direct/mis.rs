@@ -7,7 +7,7 @@ use crate::integrators::transport::ray::PathRay;
 use crate::integrators::transport::tile::TileContext;
 use crate::lights::{GeometryOfLight, LightHitPoint, LightSamplePacket, Side};
 use crate::materials::Footprint;
-use crate::materials::bsdf::{BsdfValuePacket, LobesToSample, ratio};
+use crate::materials::bsdf::{BsdfValuePacket, LobesToSample, divide_lanes_or_zero};
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Simd, Vec3x16, lane, set_lane};
 use crate::world::{Hit, MAX_NULL_INTERACTIONS};
@@ -109,7 +109,7 @@ impl CompetingTechnique {
         match self {
             Self::Nothing | Self::Paths => {}
             Self::NarrowPaths | Self::Lobes(_) => {
-                let change = ratio(unweighted, weighted);
+                let change = divide_lanes_or_zero(unweighted, weighted);
                 for axis in 0..3 {
                     for i in 0..PACKET_SIZE {
                         fraction[axis][i] *= change[axis][i];
@@ -208,7 +208,7 @@ impl TileContext<'_> {
         weight: impl Fn(f32) -> f32,
     ) -> Vec3 {
         let lights = &self.world.lights;
-        if !lights.has_visible_infinite_lights() {
+        if !lights.escaping_rays_can_hit_light() {
             return Vec3::ZERO;
         }
         let samples = lights.expected_sample_counts(self.behavior.receivers, ray.origin, normal);
@@ -225,7 +225,7 @@ impl TileContext<'_> {
         let lights = &self.world.lights;
         let side = if of_light.dot(direction) > 0.0 { Side::Back } else { Side::Front };
         lights.light_on_primitive(hit.object, primitive, side).map_or(0.0, |(number, light)| {
-            light.pdf(ray.origin, normal, &met)
+            light.pdf_of_hit(ray.origin, normal, &met)
                 * lights.expected_sample_counts(self.behavior.receivers, ray.origin, normal).for_light(number)
         })
     }

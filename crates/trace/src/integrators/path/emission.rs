@@ -24,7 +24,7 @@ impl CameraPathWavefront<'_, '_> {
     ) -> (u32, u32) {
         let (render, lights) = (&self.tile.settings.render, &self.tile.world.lights);
         let plain = if render.ambient == Vec3::ZERO { packet.shining } else { packet.plain };
-        let is_dark_beyond = render.background == Vec3::ZERO && !lights.has_visible_infinite_lights();
+        let is_dark_beyond = render.background == Vec3::ZERO && !lights.escaping_rays_can_hit_light();
         (plain, if is_dark_beyond { 0 } else { rays.mask() & !packet.any })
     }
 
@@ -62,7 +62,7 @@ impl CameraPathWavefront<'_, '_> {
         }
         // Add the background and the infinite lights.
         let lights = &tile.world.lights;
-        if !lights.has_visible_infinite_lights() {
+        if !lights.escaping_rays_can_hit_light() {
             let slots = set_bit_lanes(beyond).map(|lane| first + lane as u32);
             return self.accumulator.add_background(slots, render.background);
         }

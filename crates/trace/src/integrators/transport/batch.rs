@@ -106,7 +106,7 @@ impl VertexBatch {
             / tile.world.lights.max_infinite_light_solid_angle()
             - 1.0;
         let least = filled.min(Self::MIN_SHARP_EXPONENT);
-        self.bsdf.mask_narrower_than(self.used, least)
+        self.bsdf.mask_of_lanes_narrower_than(self.used, least)
     }
 
     /// Returns the vertices' samplers.

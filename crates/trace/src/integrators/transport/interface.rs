@@ -4,7 +4,7 @@ use super::cone::SpecularEvent;
 use super::interiors::{InteriorList, medium_ior};
 use super::ray::PathRay;
 use super::vertex::{PerturbedAndSmoothNormals, SurfaceVertex};
-use crate::materials::fresnel::{dielectric, refract_given_transmitted_cosine};
+use crate::materials::fresnel::{fresnel_dielectric, refract_given_transmitted_cosine};
 use crate::materials::mirror::reflect;
 use crate::math::Vec3;
 use crate::world::World;
@@ -92,7 +92,7 @@ fn reflectance_and_refraction(
     let (shading, geometric) = (shading.normal, vertex.normal);
     let crosses = |direction: &Vec3| direction.dot(geometric) < 0.0;
     let by = |normal: Vec3| {
-        let (reflectance, cosine) = dielectric(-normal.dot(incident), eta);
+        let (reflectance, cosine) = fresnel_dielectric(-normal.dot(incident), eta);
         (reflectance, cosine.map(|cosine| refract_given_transmitted_cosine(incident, normal, eta, cosine)))
     };
     let shaded = if shading.dot(incident) < 0.0 { by(shading) } else { by(geometric) };

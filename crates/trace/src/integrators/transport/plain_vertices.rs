@@ -69,7 +69,7 @@ impl VertexBatch {
                 [0; PACKET_SIZE]
             }
         };
-        self.bsdf.set_normals_and_directions(Some(&of), &mut normals, &rays.direction, simd);
+        self.bsdf.set_normals_and_ray_directions(Some(&of), &mut normals, &rays.direction, simd);
         for axis in 0..3 {
             select(&of, &facets[axis], &mut self.horizon[axis]);
             select(&of, &facets[axis], &mut self.facet[axis]);
@@ -108,7 +108,7 @@ impl VertexBatch {
             set_lane(&mut self.from, i, from);
             set_lane(&mut self.normal, i, normal);
         }
-        self.bsdf.set_normals_and_directions(None, &mut self.normal, &rays.direction, simd);
+        self.bsdf.set_normals_and_ray_directions(None, &mut self.normal, &rays.direction, simd);
         // Replace the normals of smooth surfaces.
         if surface.smooth != 0 {
             self.set_smooth_normals_and_lifts(rays, surface, lifts, simd);

@@ -37,7 +37,7 @@ impl BounceContinuationRules {
     pub fn new(tile: &TileContext<'_>, depth: u32, lobes: LobesToSample) -> Self {
         let emits = || tile.world.materials.iter().any(Material::is_emissive);
         let max_depth = tile.settings.render.max_depth;
-        let shines = || tile.world.lights.has_visible_infinite_lights() || emits();
+        let shines = || tile.world.lights.escaping_rays_can_hit_light() || emits();
         let continues = depth + 1 < max_depth || depth + 1 == max_depth && shines();
         Self { continues, uses_roulette: depth >= Self::MIN_DEPTH, lobes }
     }

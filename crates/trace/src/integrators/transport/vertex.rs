@@ -159,7 +159,7 @@ impl<'a> SurfaceVertex<'a> {
     pub fn emitted_radiance(&self, path: &PathRay, counters: &mut RayCounters) -> Vec3 {
         let is_shared = path.state.pdf > 0.0;
         let at = self.texture_lookup_point(is_shared);
-        self.material.emission.radiance_of_emitting_side(
+        self.material.emission.radiance_at_cosine(
             &at,
             self.normal.dot(self.wo),
             &mut counters.texture_lookups,

@@ -127,7 +127,7 @@ impl LitScene {
             layers: LayerSet::NONE,
         };
         let pixels = Rect { x: 0, y: 0, width: PACKET_SIZE as u32, height: 1 }.into();
-        let bsdf = match world.materials[number].bsdf.as_non_specular() {
+        let bsdf = match world.materials[number].bsdf.as_purely_non_specular() {
             Some(material) => material.with_white_textures(),
             None => BxdfPoint::DielectricReflection(RoughDielectricPoint {
                 near: 1.0,
@@ -232,7 +232,7 @@ impl LitScene {
             return Vec3::ZERO;
         }
         let at = world.texture_point(&hit, &surface, |_| Footprint::POINT);
-        emission.radiance_of_emitting_side(&at, cosine, &mut 0) * tile.emitter_mis_weight(path, &hit)
+        emission.radiance_at_cosine(&at, cosine, &mut 0) * tile.emitter_mis_weight(path, &hit)
     }
 
     /// Reflected light, estimated from all samples of all lanes.

@@ -136,7 +136,8 @@ fn mesh_emission_matches_light_sampling() {
 #[test]
 fn environment_emission_matches_light_sampling() {
     let sky = Arc::new(EnvironmentMap::new(patchy(24, 12)).expect("light"));
-    let light = Light::Environment(Environment::from_map(sky, COLOR, MapOrientation::from_degrees(77.0)));
+    let light =
+        Light::Environment(Environment::from_map(sky, COLOR, MapOrientation::from_azimuth_degrees(77.0)));
     let source = source_of(light.clone(), None);
     let found = mean(&source, 1 << 14, |photon| f64::from(photon.flux.y));
     let told = f64::from(source.total_light_power().y);

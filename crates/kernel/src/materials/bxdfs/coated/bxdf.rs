@@ -5,7 +5,7 @@ use crate::materials::bsdf::{BxdfParameters, LobesToSample, NarrowLobe};
 use crate::materials::bxdf::{
     Bxdf, BxdfFlags, LobeValue, LobesWithNormal, ShadingGeometry, choose_vec3_by_bool,
 };
-use crate::materials::coat::{ClearCoatLayer, clamp_cosine_to_nonnegative, interreflection_gain};
+use crate::materials::coat::{SchlickCoatLayer, clamp_cosine_to_nonnegative, interreflection_gain};
 use crate::math::Vec3;
 use crate::math::lanes::Mask;
 use crate::math::soa::Soa;
@@ -58,7 +58,7 @@ soa! {
     /// A clear coat, and the interreflection with its base.
     pub struct ClearCoat in ClearCoatPacket {
         /// The coat.
-        coat: ClearCoatLayer = ClearCoatLayer::default(),
+        coat: SchlickCoatLayer = SchlickCoatLayer::default(),
         /// Factor for the wide lobes of the base.
         wide_gain: Vec3 = Vec3::ONE,
         /// Reflectance of the narrow lobes of the base.
@@ -144,9 +144,9 @@ impl<B: Bxdf> Bxdf for CoatedBxdf<B> {
 
     #[inline(always)]
     fn new(point: &Self::Point, tangent: Vec3) -> Self {
-        let [wide, narrow_reflectance] = point.base.lobe_reflectances_under_coat();
+        let [wide, narrow_reflectance] = point.base.interreflection_reflectances();
         let wide_gain = interreflection_gain(wide, point.coat.weight * point.coat.albedo.mean);
-        let coat = ClearCoatLayer::from(&point.coat);
+        let coat = SchlickCoatLayer::from(&point.coat);
         let layer = ClearCoat { coat, wide_gain, narrow_reflectance };
         Self { layer, base: B::new(&point.base, tangent) }
     }

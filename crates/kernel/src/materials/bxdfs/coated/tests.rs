@@ -13,7 +13,7 @@ use crate::materials::coat::CoatTexturedParameters;
 use crate::materials::conductor::{ConductorBxdf, ConductorPoint, FresnelPoint};
 use crate::materials::lookup::WhiteTextureLookup;
 use crate::materials::microfacet::MicrofacetDistribution;
-use crate::materials::phong::{PhongBsdf, PhongBxdf};
+use crate::materials::phong::{PhongBxdf, PhongPoint};
 use crate::materials::plastic::{PlasticBxdf, PlasticPoint};
 use crate::materials::principled::{PrincipledBxdf, PrincipledPoint};
 use crate::materials::scalar::ScalarParameter;
@@ -35,8 +35,8 @@ fn coated<P>(base: P, weight: f32, alpha: f32, ior: f32, tint: Vec3) -> CoatedPo
     CoatedPoint { coat, base }
 }
 
-fn phong(diffuse: Vec3, specular: f32, shininess: f32) -> PhongBsdf {
-    PhongBsdf { diffuse, specular: Vec3::splat(specular), shininess, ambient: Vec3::ZERO }
+fn phong(diffuse: Vec3, specular: f32, shininess: f32) -> PhongPoint {
+    PhongPoint { diffuse, specular: Vec3::splat(specular), shininess, ambient: Vec3::ZERO }
 }
 
 fn conductor(alphas: [f32; 2]) -> ConductorPoint {
@@ -314,7 +314,7 @@ fn lanes_are_independent() {
         let coat = coated((), f32::max(weight, 0.1), alpha, 1.5, tint).coat;
         CoatPoint { weight, ..coat }
     };
-    let over = |base: PhongBsdf| coats.map(|one| CoatedPoint { coat: coat(one), base });
+    let over = |base: PhongPoint| coats.map(|one| CoatedPoint { coat: coat(one), base });
     let phongs = [phong(RED, 0.0, 1.0), phong(RED, 0.4, 30.0), phong(Vec3::ZERO, 0.5, 5.0)].map(over);
     check_lane_independence::<CoatedBxdf<PhongBxdf>>(phongs.as_flattened());
     let metals = coats.map(|one| CoatedPoint { coat: coat(one), base: conductor([0.2, 0.4]) });

@@ -4,7 +4,7 @@ mod bxdf;
 pub mod elements;
 
 use crate::materials::bsdf::{BxdfParameters, SpatiallyVaryingBxdf};
-use crate::materials::fresnel::{conductor, schlick_weight};
+use crate::materials::fresnel::{fresnel_conductor, schlick_weight};
 use crate::materials::lookup::ParameterLookup;
 use crate::materials::microfacet;
 use crate::materials::scalar::ScalarParameter;
@@ -95,7 +95,7 @@ impl FresnelPoint {
 /// Reflectance of a facet in one channel. `weight` is the [`schlick_weight`] of the cosine.
 #[inline(always)]
 fn reflectance(first: f32, second: f32, cosine: f32, weight: f32) -> f32 {
-    let exact = conductor(cosine, first, second);
+    let exact = fresnel_conductor(cosine, first, second);
     let approximate = first + (1.0 - first) * weight;
     if second < 0.0 { approximate } else { exact }
 }
@@ -140,7 +140,7 @@ impl BxdfParameters for ConductorPoint {
     }
 
     #[inline(always)]
-    fn lobe_reflectances_under_coat(&self) -> [Vec3; 2] {
+    fn interreflection_reflectances(&self) -> [Vec3; 2] {
         [Vec3::ZERO, self.fresnel.reflectance(1.0)]
     }
 }

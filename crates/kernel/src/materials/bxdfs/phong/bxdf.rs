@@ -2,7 +2,7 @@
 
 use std::f32::consts::FRAC_1_PI;
 
-use super::PhongBsdf;
+use super::PhongPoint;
 use super::lobes::{PhongLobes, phong_cosine_power};
 use crate::materials::bsdf::{LobesToSample, NarrowLobe};
 use crate::materials::bxdf::{Bxdf, BxdfFlags, LobeValue, LobesWithNormal, ShadingGeometry};
@@ -46,7 +46,7 @@ impl PhongBxdf {
 }
 
 impl Bxdf for PhongBxdf {
-    type Point = PhongBsdf;
+    type Point = PhongPoint;
     type View = PhongViewTerms;
 
     const TURNS_NORMALS: bool = false;
@@ -56,7 +56,7 @@ impl Bxdf for PhongBxdf {
     const ALWAYS: BxdfFlags = BxdfFlags::WIDE;
 
     #[inline(always)]
-    fn new(point: &PhongBsdf, _: Vec3) -> Self {
+    fn new(point: &PhongPoint, _: Vec3) -> Self {
         Self {
             diffuse: point.diffuse_value(),
             specular: point.specular_peak(),
@@ -66,7 +66,7 @@ impl Bxdf for PhongBxdf {
     }
 
     #[inline(always)]
-    fn set_looked_up_color(&mut self, _: &PhongBsdf, color: Vec3) {
+    fn set_looked_up_color(&mut self, _: &PhongPoint, color: Vec3) {
         self.diffuse = color * FRAC_1_PI;
         self.albedos[0] = color.max_element();
     }

@@ -32,7 +32,7 @@ pub struct Phong {
 
 /// [`Phong`] at a point, after texture lookups.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PhongBsdf {
+pub struct PhongPoint {
     /// Diffuse reflectance kd.
     pub diffuse: Vec3,
     /// Specular reflectance ks.
@@ -44,12 +44,12 @@ pub struct PhongBsdf {
 }
 
 impl SpatiallyVaryingBxdf for Phong {
-    type Point = PhongBsdf;
+    type Point = PhongPoint;
 
     #[inline(always)]
-    fn look_up_parameters<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> PhongBsdf {
+    fn look_up_parameters<'m>(&'m self, lookup: &mut impl ParameterLookup<'m>) -> PhongPoint {
         let diffuse = lookup.color(&self.diffuse);
-        PhongBsdf {
+        PhongPoint {
             diffuse,
             specular: lookup.color(&self.specular),
             shininess: self.shininess,
@@ -72,7 +72,7 @@ impl SpatiallyVaryingBxdf for Phong {
     }
 }
 
-impl BxdfParameters for PhongBsdf {
+impl BxdfParameters for PhongPoint {
     #[inline]
     fn is_black(&self) -> bool {
         self.diffuse == Vec3::ZERO && self.specular == Vec3::ZERO
@@ -88,12 +88,12 @@ impl BxdfParameters for PhongBsdf {
     }
 
     #[inline(always)]
-    fn lobe_reflectances_under_coat(&self) -> [Vec3; 2] {
+    fn interreflection_reflectances(&self) -> [Vec3; 2] {
         [self.diffuse, self.specular]
     }
 }
 
-impl PhongBsdf {
+impl PhongPoint {
     /// The diffuse part of f in sr⁻¹.
     pub fn diffuse_value(&self) -> Vec3 {
         self.diffuse * FRAC_1_PI
@@ -106,9 +106,9 @@ impl PhongBsdf {
 }
 
 #[cfg(test)]
-impl PhongBsdf {
+impl PhongPoint {
     /// f in sr⁻¹. `normal` is the unit normal on the viewer's side.
-    fn value(&self, normal: Vec3, wo: Vec3, wi: Vec3) -> Vec3 {
+    fn f(&self, normal: Vec3, wo: Vec3, wi: Vec3) -> Vec3 {
         let bxdf = PhongBxdf::new(self, Vec3::ZERO);
         let any = PhongBxdf::ALWAYS.union(bxdf.flags());
         let view = bxdf.compute_view_terms(&ShadingGeometry { normal, wo, tangent: Vec3::ZERO }, any);
@@ -130,15 +130,15 @@ mod tests {
     use super::super::lobe_tests::NarrowLightPath;
     use super::*;
 
-    fn glossy(shininess: f32) -> PhongBsdf {
-        PhongBsdf { diffuse: Vec3::ZERO, specular: Vec3::ONE, shininess, ambient: Vec3::ZERO }
+    fn glossy(shininess: f32) -> PhongPoint {
+        PhongPoint { diffuse: Vec3::ZERO, specular: Vec3::ONE, shininess, ambient: Vec3::ZERO }
     }
 
     #[test]
     fn lobes_are_bit_identical_in_all_views() {
         let (diffuse, specular) = (Vec3::new(0.4, 0.2, 0.1), Vec3::splat(0.5));
         let points = [0.0, 1.0, 40.0, 1e4, 1e6];
-        let points = points.map(|shininess| PhongBsdf { diffuse, specular, shininess, ambient: Vec3::ZERO });
+        let points = points.map(|shininess| PhongPoint { diffuse, specular, shininess, ambient: Vec3::ZERO });
         check_shown_lobes::<PhongBxdf>(&points, NarrowLightPath::Mirrored);
     }
 
@@ -146,7 +146,7 @@ mod tests {
     fn lanes_are_independent() {
         let points = [0.0, 0.5].map(|specular| {
             let (diffuse, specular) = (Vec3::new(0.4, 0.2, 0.1), Vec3::splat(specular));
-            [0.0, 1.0, 40.0, 1e4, 1e6].map(|shininess| PhongBsdf {
+            [0.0, 1.0, 40.0, 1e4, 1e6].map(|shininess| PhongPoint {
                 diffuse,
                 specular,
                 shininess,
@@ -157,7 +157,7 @@ mod tests {
     }
 
     fn reflected(shininess: f32, to_eye: Vec3, to_light: Vec3) -> f32 {
-        glossy(shininess).value(Vec3::Z, to_eye, to_light).x
+        glossy(shininess).f(Vec3::Z, to_eye, to_light).x
     }
 
     fn at_angle(degrees: f32) -> Vec3 {

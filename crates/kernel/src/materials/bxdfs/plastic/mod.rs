@@ -10,7 +10,7 @@ use std::f32::consts::FRAC_1_PI;
 
 use crate::materials::bsdf::{BxdfParameters, SpatiallyVaryingBxdf};
 use crate::materials::lobe_albedo::{
-    AlbedoTable, LobeAlbedoPolynomial, fresnel_dielectric_f64, reflectance_under_coat,
+    AlbedoTable, LobeAlbedoPolynomial, fresnel_dielectric_f64, reflectance_inside_coat,
 };
 use crate::materials::lookup::ParameterLookup;
 use crate::materials::microfacet::{self, MicrofacetDistribution};
@@ -95,7 +95,7 @@ fn base_layer_f(diffuse: Vec3, ior: f32, coat: &LobeAlbedoPolynomial, is_linear:
     let squared = ior * ior;
     let returned = 1.0 - (1.0 - coat.mean) / squared;
     let reflected =
-        if is_linear { diffuse / (1.0 - returned) } else { reflectance_under_coat(diffuse, returned) };
+        if is_linear { diffuse / (1.0 - returned) } else { reflectance_inside_coat(diffuse, returned) };
     reflected * (FRAC_1_PI / squared)
 }
 

@@ -5,7 +5,7 @@ use crate::materials::bsdf::NarrowLobe;
 use crate::materials::bxdf::{
     Bxdf, BxdfFlags, LobeValue, LobesWithNormal, ShadingGeometry, choose_vec3_by_bool,
 };
-use crate::materials::fresnel::{dielectric_for_any_eta, fresnel_transmittance};
+use crate::materials::fresnel::{fresnel_dielectric_any_eta, fresnel_transmittance};
 use crate::materials::microfacet::{
     MicrofacetDistribution, SmithDirectionTerms, UnnormalizedHalfVector, reflect_at, refract_at,
     sample_visible_normal,
@@ -79,7 +79,8 @@ impl<const THROUGH: bool, const BECKMANN: bool> DielectricBxdf<THROUGH, BECKMANN
         let [eye, light] = self.view_and_light_smith_terms(view, wi);
         if !THROUGH {
             let half = UnnormalizedHalfVector::from_reflection(view.normal, view.wo, wi);
-            let reflectance = dielectric_for_any_eta(half.cosine_to_either_direction(), self.far / self.near);
+            let reflectance =
+                fresnel_dielectric_any_eta(half.cosine_to_either_direction(), self.far / self.near);
             return reflectance
                 * eye.torrance_sparrow_without_fresnel(
                     &light,
@@ -118,7 +119,7 @@ impl<const THROUGH: bool, const BECKMANN: bool> DielectricBxdf<THROUGH, BECKMANN
         let indices = [self.near, self.far];
         let eta = indices[1] / indices[0];
         let cosine = half.dot(wo);
-        let reflectance = dielectric_for_any_eta(cosine, eta);
+        let reflectance = fresnel_dielectric_any_eta(cosine, eta);
         let is_reflected = choice < reflectance;
         let refracted = refract_at(half, wo, eta);
         let wi = choose_vec3_by_bool(is_reflected, reflect_at(half, wo), refracted);
@@ -197,7 +198,7 @@ impl<const THROUGH: bool, const BECKMANN: bool> Bxdf for DielectricBxdf<THROUGH,
     ) -> Vec3 {
         let half = self.sample_facet_normal(view, u);
         let eta = self.far / self.near;
-        let is_reflected = choice < dielectric_for_any_eta(half.dot(view.wo), eta);
+        let is_reflected = choice < fresnel_dielectric_any_eta(half.dot(view.wo), eta);
         let wi = if THROUGH { refract_at(half, view.wo, eta) } else { reflect_at(half, view.wo) };
         // If the other side is chosen, the path continues at that side's vertex, and this direction is not
         // used.
@@ -209,7 +210,7 @@ impl<const THROUGH: bool, const BECKMANN: bool> Bxdf for DielectricBxdf<THROUGH,
     fn narrow_lobe(&self, view: &DielectricViewTerms) -> Option<NarrowLobe> {
         let &DielectricViewTerms { normal, wo } = view;
         let eta = self.far / self.near;
-        let reflectance = dielectric_for_any_eta(normal.dot(wo), eta);
+        let reflectance = fresnel_dielectric_any_eta(normal.dot(wo), eta);
         if !THROUGH {
             return Some(NarrowLobe::from_microfacets(normal, wo, self.alpha, reflectance, 0.0));
         }

@@ -12,7 +12,7 @@ use crate::materials::bxdfs::lobe_tests::{
 use crate::materials::bxdfs::reference_tests::{
     beckmann_d, beckmann_lambda, reference_beckmann_brdf, reference_microfacet_brdf, squared_slope,
 };
-use crate::materials::fresnel::dielectric;
+use crate::materials::fresnel::fresnel_dielectric;
 use crate::math::DVec3;
 use crate::math::random::unit_generator as random;
 
@@ -262,7 +262,7 @@ fn narrow_lobes_approach_smooth_glass() {
         for cosine in [0.3, 0.7, 1.0] {
             let (reflection, transmission) =
                 parts::<false>(&glass(indices, 0.001), spherical_direction(cosine, 0.2));
-            let smooth = f64::from(dielectric(cosine as f32, indices[1] / indices[0]).0);
+            let smooth = f64::from(fresnel_dielectric(cosine as f32, indices[1] / indices[0]).0);
             let (reflected, through) = (reflection.sampled_albedo(128).x, transmission.sampled_albedo(128).x);
             assert!((reflected - smooth).abs() < 1e-3, "{indices:?}, {cosine}: {reflected}, not {smooth}");
             assert!(

@@ -6,7 +6,7 @@ mod bxdf;
 
 use std::f32::consts::FRAC_1_PI;
 
-use super::phong::{Phong, PhongBsdf};
+use super::phong::{Phong, PhongPoint};
 use crate::materials::bsdf::{BxdfParameters, SpatiallyVaryingBxdf};
 use crate::materials::lookup::ParameterLookup;
 use crate::materials::texture::ColorOrTexture;
@@ -26,7 +26,7 @@ pub struct TranslucentPhong {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TranslucentPoint {
     /// The reflecting lobes.
-    pub reflection: PhongBsdf,
+    pub reflection: PhongPoint,
     /// Diffuse transmittance kt.
     pub transmission: Vec3,
 }
@@ -45,7 +45,7 @@ impl TranslucentPoint {
 
     /// Probability that a path continues on the other side.
     fn transmission_probability(&self) -> f32 {
-        let PhongBsdf { diffuse, specular, .. } = self.reflection;
+        let PhongPoint { diffuse, specular, .. } = self.reflection;
         let through = self.transmission.max_element();
         let all = diffuse.max_element() + specular.max_element() + through;
         through / all.max(f32::MIN_POSITIVE)
@@ -91,8 +91,8 @@ impl BxdfParameters for TranslucentPoint {
     }
 
     #[inline(always)]
-    fn lobe_reflectances_under_coat(&self) -> [Vec3; 2] {
-        self.reflection.lobe_reflectances_under_coat()
+    fn interreflection_reflectances(&self) -> [Vec3; 2] {
+        self.reflection.interreflection_reflectances()
     }
 }
 

@@ -10,7 +10,7 @@ use crate::math::DVec3;
 use std::f64::consts::PI;
 
 fn point(specular: f32, shininess: f32, transmission: f32) -> TranslucentPoint {
-    let reflection = PhongBsdf {
+    let reflection = PhongPoint {
         diffuse: Vec3::new(0.3, 0.2, 0.1),
         specular: Vec3::splat(specular),
         shininess,

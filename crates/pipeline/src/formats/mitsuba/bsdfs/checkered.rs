@@ -26,7 +26,7 @@ impl<'a> SceneReader<'a> {
         let anisotropy = (1.0 - ratio) / 0.9;
         if anisotropy > 1.0 {
             let text = "the ratio is limited to 10";
-            self.notes.substitute(
+            self.notes.note_substitution(
                 "`alpha_u` and `alpha_v` that differ by more than a factor of 10",
                 text,
                 object.span.clone(),

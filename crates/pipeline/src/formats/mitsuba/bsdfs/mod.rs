@@ -86,7 +86,7 @@ impl MaterialBuilder {
         Self { is_one_sided: true, ..Self::new(kind, keys) }
     }
 
-    fn has(&self, key: &str) -> bool {
+    fn has_key(&self, key: &str) -> bool {
         self.keys.iter().any(|(known, _)| *known == key)
     }
 }

@@ -64,7 +64,7 @@ impl<'a> SceneReader<'a> {
     /// Adds the opacity of the mask that contains a material.
     pub(super) fn add_opacity(&mut self, built: &mut MaterialBuilder, context: BsdfContext) {
         let Some(object) = context.mask.map(|index| self.object_by_index(index)) else { return };
-        if built.is_glass && !built.has("thin") || built.has("opacity") {
+        if built.is_glass && !built.has_key("thin") || built.has_key("opacity") {
             let text = "the mask is ignored";
             self.notes.substitute_changing_lighting("`mask` around solid glass", text, object.span.clone());
             return;
@@ -130,7 +130,7 @@ impl<'a> SceneReader<'a> {
         }
         let mut built = self.bsdf(child.target, context)?;
         let inner = self.object_by_index(child.target);
-        if built.is_glass && !built.has("thin") {
+        if built.is_glass && !built.has_key("thin") {
             self.refuse(blend, "blends that contain solid glass");
             return None;
         }
@@ -246,7 +246,7 @@ impl<'a> SceneReader<'a> {
             texture = inner.target;
         }
         let mut built = self.bsdf(nested.target, context)?;
-        if built.is_blend || built.is_invisible || built.has("bump") {
+        if built.is_blend || built.is_invisible || built.has_key("bump") {
             let text = "the bump map is ignored";
             self.notes.substitute_changing_lighting(
                 "`bumpmap` around a blend or another bump map",
@@ -282,7 +282,7 @@ impl<'a> SceneReader<'a> {
             object.property(name);
         }
         let mut built = self.bsdf(nested.target, context)?;
-        if built.is_blend || built.is_invisible || built.has("normal_map") {
+        if built.is_blend || built.is_invisible || built.has_key("normal_map") {
             let text = "the normal map is ignored";
             self.notes.substitute_changing_lighting(
                 "`normalmap` around a blend or another normal map",

@@ -116,7 +116,11 @@ impl<'a> SceneReader<'a> {
             Some(("beckmann", _)) => keys.push(("distribution", "beckmann".into())),
             Some(("ggx", _)) => {}
             Some(("phong" | "as", span)) => {
-                self.notes.substitute("the Phong microfacet distribution", "replaced by Beckmann", span);
+                self.notes.note_substitution(
+                    "the Phong microfacet distribution",
+                    "replaced by Beckmann",
+                    span,
+                );
                 keys.push(("distribution", "beckmann".into()));
             }
             Some((other, span)) => {

@@ -1,12 +1,12 @@
 //! Tests that compare samples with pdfs, and the means of samples with exact albedos.
 
 use super::*;
-use crate::materials::phong::PhongBsdf;
+use crate::materials::phong::PhongPoint;
 use crate::math::random::unit_generator as random;
 
-fn bsdf(diffuse: f32, specular: f32, shininess: f32) -> PhongBsdf {
+fn bsdf(diffuse: f32, specular: f32, shininess: f32) -> PhongPoint {
     let [diffuse, specular] = [diffuse, specular].map(Vec3::splat);
-    PhongBsdf { diffuse, specular, shininess, ambient: Vec3::ZERO }
+    PhongPoint { diffuse, specular, shininess, ambient: Vec3::ZERO }
 }
 
 /// Unit normals. One of them is near a frame's pole.
@@ -143,7 +143,7 @@ fn combined_lobe_samples_follow_the_pdf() {
 }
 
 /// Albedo, estimated as the mean of f·cos/pdf over samples.
-fn albedo(bsdf: &PhongBsdf, degrees: f32) -> f64 {
+fn albedo(bsdf: &PhongPoint, degrees: f32) -> f64 {
     let (mut next, normal) = (random(3), normals()[2]);
     let lobes = bsdf.lobes(normal, at_angle(normal, degrees));
     let one = |_| {
@@ -151,8 +151,7 @@ fn albedo(bsdf: &PhongBsdf, degrees: f32) -> f64 {
         let gloss = phong_cosine_power(lobes.mirrored_eye, direction, lobes.shininess);
         let cosine = normal.dot(direction).max(0.0);
         assert!(
-            (lobes.gray_f_of_all_lobes(gloss) - bsdf.value(normal, at_angle(normal, degrees), direction).x)
-                .abs()
+            (lobes.gray_f_of_all_lobes(gloss) - bsdf.f(normal, at_angle(normal, degrees), direction).x).abs()
                 <= 1e-6 * lobes.gray_f_of_all_lobes(gloss)
         );
         f64::from(lobes.gray_f_of_all_lobes(gloss) * cosine / lobes.pdf(direction, gloss))
@@ -191,8 +190,8 @@ fn values_are_reciprocal() {
                 .to_world(Vec3::new(0.01 * next(), 0.0, 1.0))
                 .normalize();
             for light in [light, near] {
-                let there = bsdf.value(normal, eye, light).x;
-                let back = bsdf.value(normal, light, eye).x;
+                let there = bsdf.f(normal, eye, light).x;
+                let back = bsdf.f(normal, light, eye).x;
                 assert!((there - back).abs() <= 3e-3 * there, "α {shininess}: {there}, reversed {back}");
             }
         }
