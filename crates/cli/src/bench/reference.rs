@@ -87,7 +87,7 @@ pub(super) fn load_reference_files(files: &[PathBuf; 2]) -> Result<SceneReferenc
     let mut names: Vec<String> = files.iter().map(|file| file.to_string_lossy().into_owned()).collect();
     names.dedup();
     let two = IndependentReferences::new(pair);
-    let noise = two.reference_noise();
+    let noise = two.relmse_of_one_reference();
     let result = ReferenceResult { samples: None, noise, seconds: None, is_cached: false, files: names };
     Ok(SceneReferences { two, result, warnings: Vec::new(), cache_error: None })
 }
@@ -209,7 +209,7 @@ fn scene_references_from_pair(
     let two = IndependentReferences::new(pair);
     let result = ReferenceResult {
         samples: Some(cost.samples),
-        noise: two.reference_noise(),
+        noise: two.relmse_of_one_reference(),
         seconds: Some(cost.seconds),
         is_cached,
         files: Vec::new(),

@@ -146,8 +146,8 @@ impl SceneRun<'_> {
         };
         let (width, height) = match &given {
             Some(reference) => (
-                reference.two.reference_pair().measured_image().width,
-                reference.two.reference_pair().measured_image().height,
+                reference.two.both_references().measured_image().width,
+                reference.two.both_references().measured_image().height,
             ),
             None => benchmark_image_size(&loaded.scene, (request.width, request.height)),
         };
@@ -188,8 +188,8 @@ impl SceneRun<'_> {
         };
         drop(session);
         let (width, height) = (
-            reference.two.reference_pair().measured_image().width,
-            reference.two.reference_pair().measured_image().height,
+            reference.two.both_references().measured_image().width,
+            reference.two.both_references().measured_image().height,
         );
         self.report_references(&reference, width, height);
         let max_samples = max_measurable_samples(reference.result.samples);

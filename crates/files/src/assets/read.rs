@@ -114,12 +114,12 @@ fn reject_as_binary_if(path: &Path, is_binary: bool) -> Result<(), AssetError> {
 /// numbers can look like UTF-16.
 pub(crate) fn reject_utf16(path: &Path, start: &[u8]) -> Result<(), AssetError> {
     let refused = || AssetError::malformed(path, Some(1), UTF16_TEXT);
-    if is_utf16(start) { Err(refused()) } else { Ok(()) }
+    if looks_like_utf16(start) { Err(refused()) } else { Ok(()) }
 }
 
 /// Whether a file starts like UTF-16 text: an optional byte order mark, then two ASCII characters, each with
 /// a zero byte.
-fn is_utf16(start: &[u8]) -> bool {
+fn looks_like_utf16(start: &[u8]) -> bool {
     let start = start.strip_prefix(b"\xff\xfe").or(start.strip_prefix(b"\xfe\xff")).unwrap_or(start);
     let is_letter = |byte: &u8| byte.is_ascii_graphic() || byte.is_ascii_whitespace();
     match start {

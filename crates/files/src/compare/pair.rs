@@ -59,7 +59,11 @@ impl ImagePair {
     /// # Errors
     /// All errors found in the two images.
     pub fn new(names: [&Path; 2], a: RadianceImage, b: RadianceImage) -> Result<Self, Vec<CompareError>> {
-        let errors = [check_finite(names[0], &a), check_finite(names[1], &b), check_sizes(names, &a, &b)];
+        let errors = [
+            nonfinite_values_error(names[0], &a),
+            nonfinite_values_error(names[1], &b),
+            different_sizes_error(names, &a, &b),
+        ];
         let errors: Vec<_> = errors.into_iter().flatten().collect();
         if errors.is_empty() { Ok(Self { a, b, warnings: Vec::new() }) } else { Err(errors) }
     }
@@ -123,7 +127,7 @@ fn read_radiance_image(path: &Path) -> Result<(RadianceImage, Vec<String>), Asse
     Ok((RadianceImage { width, height, pixels: texels.into_linear_colors() }, image.warnings))
 }
 
-fn check_finite(path: &Path, image: &RadianceImage) -> Option<CompareError> {
+fn nonfinite_values_error(path: &Path, image: &RadianceImage) -> Option<CompareError> {
     const CHANNELS: [&str; 3] = ["red", "green", "blue"];
     let first = image.pixels.iter().position(|pixel| !pixel.is_finite())?;
     let channel = image.pixels[first].to_array().iter().position(|value| !value.is_finite())?;
@@ -138,7 +142,7 @@ fn check_finite(path: &Path, image: &RadianceImage) -> Option<CompareError> {
     })
 }
 
-fn check_sizes(names: [&Path; 2], a: &RadianceImage, b: &RadianceImage) -> Option<CompareError> {
+fn different_sizes_error(names: [&Path; 2], a: &RadianceImage, b: &RadianceImage) -> Option<CompareError> {
     let sizes = [a, b].map(|image| [image.width, image.height]);
     (sizes[0] != sizes[1]).then(|| CompareError::Sizes { paths: names.map(Path::to_owned), sizes })
 }

@@ -32,7 +32,7 @@ impl IndependentReferences {
     }
 
     /// The two references.
-    pub fn reference_pair(&self) -> &ImagePair {
+    pub fn both_references(&self) -> &ImagePair {
         &self.pair
     }
 
@@ -45,7 +45,7 @@ impl IndependentReferences {
     /// Mean of (x − r)(y − r), relative to r². For two images rendered with the same method and independent
     /// noise, the expected value is the squared bias.
     pub fn cross_error_of_two_images(&self, x: &RadianceImage, y: &RadianceImage) -> f64 {
-        let pixels = self.pixels_with_relmse_weights().zip(x.pixels.iter().zip(&y.pixels));
+        let pixels = self.weighted_reference_pixels().zip(x.pixels.iter().zip(&y.pixels));
         let sum = pixels.fold(DVec3::ZERO, |sum, ((weight, a, b), (x, y))| {
             let (x, y) = (x.as_dvec3(), y.as_dvec3());
             sum + weight * ((x - a) * (y - b) + (x - b) * (y - a)) / 2.0
@@ -54,9 +54,9 @@ impl IndependentReferences {
     }
 
     /// relMSE of one reference: the error that its noise would add if only one reference were used.
-    pub fn reference_noise(&self) -> f64 {
+    pub fn relmse_of_one_reference(&self) -> f64 {
         let sum = self
-            .pixels_with_relmse_weights()
+            .weighted_reference_pixels()
             .fold(DVec3::ZERO, |sum, (weight, a, b)| sum + weight * (a - b) * (a - b));
         sum.element_sum() / 2.0
     }
@@ -64,7 +64,7 @@ impl IndependentReferences {
     /// Standard error of [`Self::unbiased_relmse`] due to the references' noise, assuming independent pixels
     /// and fully correlated channels.
     pub fn relmse_standard_error(&self, x: &RadianceImage) -> f64 {
-        let variances = self.pixels_with_relmse_weights().zip(&x.pixels).map(|((weight, a, b), x)| {
+        let variances = self.weighted_reference_pixels().zip(&x.pixels).map(|((weight, a, b), x)| {
             let (between, from) = ((a - b) * (a - b), x.as_dvec3() - (a + b) / 2.0);
             let channel_deviation = |channel: usize| {
                 // Add the variances of a·b and (x − truth)(a + b). The variance of one reference is half of
@@ -86,18 +86,18 @@ impl IndependentReferences {
 
     /// Mean luminance of both references.
     pub fn mean_luminance(&self) -> f64 {
-        let sum: f64 = self.pixels_with_relmse_weights().map(|(_, a, b)| luminance((a + b) / 2.0)).sum();
+        let sum: f64 = self.weighted_reference_pixels().map(|(_, a, b)| luminance((a + b) / 2.0)).sum();
         sum / self.weights.len() as f64
     }
 
     /// Standard error of [`Self::relative_bias`] due to the references' noise, assuming independent pixels.
     pub fn relative_bias_standard_error(&self) -> f64 {
         let square = |x: f64| x * x;
-        let squares = self.pixels_with_relmse_weights().map(|(_, a, b)| square(luminance((a - b) / 2.0)));
+        let squares = self.weighted_reference_pixels().map(|(_, a, b)| square(luminance((a - b) / 2.0)));
         squares.sum::<f64>().sqrt() / self.weights.len() as f64 / self.mean_luminance()
     }
 
-    fn pixels_with_relmse_weights(&self) -> impl Iterator<Item = (DVec3, DVec3, DVec3)> {
+    fn weighted_reference_pixels(&self) -> impl Iterator<Item = (DVec3, DVec3, DVec3)> {
         let pixels = self.pair.measured_image().pixels.iter().zip(&self.pair.reference().pixels);
         self.weights.iter().zip(pixels).map(|(weight, (a, b))| (*weight, a.as_dvec3(), b.as_dvec3()))
     }
@@ -137,7 +137,7 @@ mod tests {
     #[test]
     fn equal_references_yield_the_standard_relmse() {
         let references = references(0.0);
-        assert_eq!(references.reference_noise(), 0.0);
+        assert_eq!(references.relmse_of_one_reference(), 0.0);
         let error = references.unbiased_relmse(&test_image(3, 0.0, 0.1));
         assert!((error - 0.01 * WEIGHT).abs() < 1e-6, "{error}");
         assert_eq!(references.relmse_standard_error(&test_image(3, 0.0, 0.1)), 0.0);
@@ -148,9 +148,9 @@ mod tests {
         let references = references(0.05);
         let noise = 0.05_f64.powi(2) / 3.0 * WEIGHT;
         assert!(
-            (references.reference_noise() / noise - 1.0).abs() < 0.05,
+            (references.relmse_of_one_reference() / noise - 1.0).abs() < 0.05,
             "noise is {}, expected {noise}",
-            references.reference_noise()
+            references.relmse_of_one_reference()
         );
         let tested = test_image(3, 0.01, 0.0);
         let truth = 0.01_f64.powi(2) / 3.0 * WEIGHT;

@@ -83,7 +83,7 @@ pub(super) struct FileAttributes {
 
 /// Attributes that could not be copied, and the permissions that are safe without them.
 #[derive(Debug, PartialEq, Eq)]
-pub(super) struct UncopiedAttributes {
+pub(super) struct AttributeCopyOutcome {
     /// Descriptions of the lost attributes, such as `its owner`.
     pub(super) lost: Vec<String>,
     mode: u32,
@@ -106,8 +106,8 @@ impl FileAttributes {
 
     /// Applies all attributes except the permissions to a new file. Until the permissions are applied, the
     /// file must be accessible only to its owner.
-    pub(super) fn apply_except_permissions(&self, new: &File) -> UncopiedAttributes {
-        let mut carried = UncopiedAttributes { lost: Vec::new(), mode: self.mode };
+    pub(super) fn apply_except_permissions(&self, new: &File) -> AttributeCopyOutcome {
+        let mut carried = AttributeCopyOutcome { lost: Vec::new(), mode: self.mode };
         // Set the flags before changing the owner, because only the owner may set them.
         #[cfg(target_os = "linux")]
         if !self.flags.try_apply_to_file(new) {
@@ -118,7 +118,7 @@ impl FileAttributes {
         carried
     }
 
-    fn copy_owner(&self, new: &File, carried: &mut UncopiedAttributes) {
+    fn copy_owner(&self, new: &File, carried: &mut AttributeCopyOutcome) {
         let ids = || new.metadata().map(|found| (found.uid(), found.gid()));
         let is_same = |found: io::Result<(u32, u32)>| found.is_ok_and(|found| found == (self.uid, self.gid));
         if is_same(ids()) || fchown(new, Some(self.uid), Some(self.gid)).is_ok() {
@@ -140,7 +140,7 @@ impl FileAttributes {
         }
     }
 
-    fn copy_extended_attributes(&self, new: &File, carried: &mut UncopiedAttributes) {
+    fn copy_extended_attributes(&self, new: &File, carried: &mut AttributeCopyOutcome) {
         for (name, value) in &self.named {
             let is_kept = value.as_ref().is_ok_and(|value| set_attribute(new, name, value).is_ok());
             if !is_kept {
@@ -156,9 +156,9 @@ impl FileAttributes {
     }
 }
 
-impl UncopiedAttributes {
+impl AttributeCopyOutcome {
     /// Applies the permissions. Must be called last, because writing clears some of them.
-    pub(super) fn apply_mode(&self, new: &File) -> io::Result<()> {
+    pub(super) fn apply_permissions(&self, new: &File) -> io::Result<()> {
         new.set_permissions(fs::Permissions::from_mode(self.mode))
     }
 
@@ -225,7 +225,7 @@ mod tests {
         let carried = attributes.apply_except_permissions(&new);
         assert_eq!(
             carried,
-            UncopiedAttributes { lost: vec!["its attribute nonsense.of.no.space".to_owned()], mode: 0o664 }
+            AttributeCopyOutcome { lost: vec!["its attribute nonsense.of.no.space".to_owned()], mode: 0o664 }
         );
     }
 
@@ -234,8 +234,8 @@ mod tests {
         // The value is not a valid list.
         let (attributes, new) = attributes(0o664, ACCESS_LIST);
         let carried = attributes.apply_except_permissions(&new);
-        assert_eq!(carried, UncopiedAttributes { lost: vec!["its access list".to_owned()], mode: 0o600 });
-        carried.apply_mode(&new).expect("permitted");
+        assert_eq!(carried, AttributeCopyOutcome { lost: vec!["its access list".to_owned()], mode: 0o600 });
+        carried.apply_permissions(&new).expect("permitted");
         assert_eq!(new.metadata().expect("a file").mode() & 0o777, 0o600);
     }
 }

@@ -14,7 +14,7 @@ use std::sync::{Arc, Once};
 use nix::errno::Errno;
 use nix::fcntl::{FcntlArg, OFlag, fcntl};
 
-use super::attributes::{FileAttributes, UncopiedAttributes};
+use super::attributes::{AttributeCopyOutcome, FileAttributes};
 use super::resolve_path::{self, TargetFile, WriteTarget};
 use super::temporary::{self, TemporaryFile};
 use super::{AttributeLossPolicy, FileIdentity, OutputError, WriteWarning, cancelable, held};
@@ -221,7 +221,7 @@ pub fn ignore_file_size_signal() {
 fn create_temporary(
     target: &TargetFile,
     guard: &ExistingFilePolicy<'_>,
-) -> io::Result<(TemporaryFile, Option<UncopiedAttributes>)> {
+) -> io::Result<(TemporaryFile, Option<AttributeCopyOutcome>)> {
     let directory = target.directory();
     if guard.sweep.is_none_or(|sweep| sweep.mark_if_unsearched(directory)) {
         temporary::remove_stale_files(directory, guard.is_kept);
@@ -237,12 +237,12 @@ fn create_temporary(
 fn write_content_and_mode(
     new: &TemporaryFile,
     content: &dyn Fn(&mut dyn Write) -> io::Result<()>,
-    carried: Option<&UncopiedAttributes>,
+    carried: Option<&AttributeCopyOutcome>,
     durability: Durability,
 ) -> io::Result<()> {
     content(&mut &new.file)?;
     if let Some(carried) = carried {
-        carried.apply_mode(&new.file)?;
+        carried.apply_permissions(&new.file)?;
     }
     match durability {
         Durability::Process => Ok(()),

@@ -100,7 +100,7 @@ impl OpenAssetFiles {
             ImageLocation::Inside(bytes) => ImageInput::Bytes(bytes.into()),
             ImageLocation::File(path) => ImageInput::File(path),
         };
-        Ok((input, container.file_hash()))
+        Ok((input, container.main_file_hash()))
     }
 }
 

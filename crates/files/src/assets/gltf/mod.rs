@@ -103,7 +103,7 @@ impl GltfFile {
     }
 
     /// Hash of the glTF file.
-    pub fn file_hash(&self) -> FileHash {
+    pub fn main_file_hash(&self) -> FileHash {
         self.hash
     }
 

@@ -83,14 +83,14 @@ impl SceneWalk<'_> {
         // Place all nodes. Visiting a node twice means a cycle or a second parent.
         let worlds = self.world_transforms(&roots)?;
         for &(node, placed, is_visible) in &worlds.order {
-            self.add_node(node, placed, is_visible, &worlds)
+            self.add_node_contents(node, placed, is_visible, &worlds)
                 .map_err(|wrong| wrong.add_location(format!("nodes[{node}]")))?;
         }
         Ok(())
     }
 
     /// Adds the contents of a node. A hidden node contributes only its camera.
-    fn add_node(
+    fn add_node_contents(
         &mut self,
         number: usize,
         placed: AffineMap,

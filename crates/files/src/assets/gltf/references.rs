@@ -16,13 +16,13 @@ use crate::control::{CancelToken, Canceled};
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
 struct UriReferences {
-    buffers: Vec<UriReference>,
-    images: Vec<UriReference>,
+    buffers: Vec<BufferOrImage>,
+    images: Vec<BufferOrImage>,
 }
 
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
-struct UriReference {
+struct BufferOrImage {
     uri: Option<FileUri>,
 }
 

@@ -111,14 +111,14 @@ pub(super) fn read_orientation(decoder: &mut dyn ImageDecoder) -> Result<Orienta
     Ok(without_prefix.and_then(Orientation::from_exif_chunk).unwrap_or(orientation))
 }
 
-/// Size of a texel produced by [`texels`](super::convert::texels).
+/// Size of a texel produced by [`image_to_texels`](super::convert::image_to_texels).
 pub(super) fn stored_bytes_per_texel(
     color: ColorType,
     encoding: ColorEncoding,
     metadata: &ImageColorMetadata,
 ) -> u64 {
     let sample_bytes = color.bytes_per_pixel() / color.channel_count();
-    let is_packed = sample_bytes == 1 && encoding.color_space(metadata).is_default();
+    let is_packed = sample_bytes == 1 && encoding.source_color_space(metadata).is_default();
     match encoding {
         ColorEncoding::CutOut(_) if color.has_alpha() => {
             if is_packed && metadata.alpha != AlphaInterpretation::Premultiplied { 4 } else { 16 }

@@ -71,7 +71,7 @@ impl ColorEncoding {
     }
 
     /// Color space of a file's samples.
-    pub(super) fn color_space(self, metadata: &ImageColorMetadata) -> ColorSpace {
+    pub(super) fn source_color_space(self, metadata: &ImageColorMetadata) -> ColorSpace {
         if self.uses_file_color_space() { metadata.space.clone() } else { ColorSpace::default() }
     }
 

@@ -190,7 +190,7 @@ impl HeaderVariables {
         HdrHeader {
             scan,
             scales: correction.map(|correction| 1.0 / (exposure * correction)),
-            space: matrix.map_or_else(ColorSpace::default, ColorSpace::from_matrix_with_default_curves),
+            space: matrix.map_or_else(ColorSpace::default, ColorSpace::from_rec_709_matrix),
             warnings: self.warnings,
         }
     }

@@ -103,10 +103,10 @@ fn decode_source(
     monitor.report_and_check_cancel(0, length)?;
     let (texels, warnings) = file.run_on_decode_thread(monitor, move |file, report| {
         let (image, mut metadata) = file.decode(encoding, report)?;
-        if let Some(words) = convert::constant_alpha_warning(&image, encoding, &metadata) {
+        if let Some(words) = convert::opacity_from_alpha_warning(&image, encoding, &metadata) {
             metadata.add_warning(words);
         }
-        Ok((convert::texels(image, encoding, &metadata), metadata.warnings))
+        Ok((convert::image_to_texels(image, encoding, &metadata), metadata.warnings))
     })?;
     monitor.report_and_check_cancel(length, length)?;
     let warning = |ImageWarning { line, words }| {

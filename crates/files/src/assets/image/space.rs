@@ -131,7 +131,10 @@ pub(super) struct ColorSpace {
 
 impl ColorSpace {
     /// Creates a color space from its curves (`None` for the default) and its matrix to linear Rec. 709.
-    pub(super) fn from_curves_and_matrix(curves: Option<[TransferFunction; 3]>, matrix: DMat3) -> Self {
+    pub(super) fn from_curves_and_rec_709_matrix(
+        curves: Option<[TransferFunction; 3]>,
+        matrix: DMat3,
+    ) -> Self {
         Self {
             curves: curves.filter(|curves| !curves.iter().all(TransferFunction::is_srgb)),
             matrix: (!is_identity(&matrix)).then_some(matrix),
@@ -139,8 +142,8 @@ impl ColorSpace {
     }
 
     /// Creates a color space that differs from the default only in its primaries.
-    pub(super) fn from_matrix_with_default_curves(matrix: DMat3) -> Self {
-        Self::from_curves_and_matrix(None, matrix)
+    pub(super) fn from_rec_709_matrix(matrix: DMat3) -> Self {
+        Self::from_curves_and_rec_709_matrix(None, matrix)
     }
 
     pub(super) fn is_default(&self) -> bool {
@@ -217,13 +220,16 @@ mod tests {
     #[test]
     fn the_default_space_is_recognized() {
         let srgb = || Some([TransferFunction::Srgb, TransferFunction::Srgb, TransferFunction::Srgb]);
-        assert!(ColorSpace::from_curves_and_matrix(srgb(), DMat3::IDENTITY).is_default());
+        assert!(ColorSpace::from_curves_and_rec_709_matrix(srgb(), DMat3::IDENTITY).is_default());
         assert!(
-            !ColorSpace::from_curves_and_matrix(srgb(), DMat3::from_diagonal(DVec3::new(1.0, 0.9, 1.0)))
-                .is_default()
+            !ColorSpace::from_curves_and_rec_709_matrix(
+                srgb(),
+                DMat3::from_diagonal(DVec3::new(1.0, 0.9, 1.0))
+            )
+            .is_default()
         );
         assert!(
-            !ColorSpace::from_curves_and_matrix(
+            !ColorSpace::from_curves_and_rec_709_matrix(
                 Some([TransferFunction::Srgb, TransferFunction::LINEAR, TransferFunction::Srgb]),
                 DMat3::IDENTITY
             )

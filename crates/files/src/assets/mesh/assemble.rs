@@ -29,7 +29,7 @@ pub(super) fn assemble_text_mesh(
     mut parsed: ParsedMesh,
     start_of: impl Fn(usize) -> Option<usize>,
 ) -> Result<LoadedMesh, AssetError> {
-    corners::split_vertices_at_seams(&mut parsed, source.monitor.token)?;
+    corners::split_vertices_by_uv_and_color(&mut parsed, source.monitor.token)?;
     let ParsedMesh {
         positions,
         normals,
@@ -48,7 +48,7 @@ pub(super) fn assemble_text_mesh(
         companions,
         pictures,
     } = parsed;
-    let (origin, positions) = recenter_positions(positions, &faces);
+    let (origin, positions) = to_origin_and_offsets(positions, &faces);
     if has_separate_corners {
         faces.merge_vertices_by_position(&positions, source.monitor.token)?;
     }
@@ -81,14 +81,14 @@ pub(super) fn assemble_text_mesh(
     for uv in mesh.uvs.iter_mut().chain(&mut mesh.second_uvs).filter(|uv| !uv.is_finite()) {
         *uv = Vec2::ZERO;
     }
-    complete_normals(&mut mesh, source.monitor.token)?;
+    normalize_and_complete_normals(&mut mesh, source.monitor.token)?;
     let hash = FileHash::default();
     Ok(LoadedMesh { hash, mesh, materials, dropped, warnings, material_warnings, companions, pictures })
 }
 
 /// Converts positions to offsets from an origin near the vertices that faces use. Offsets too large for `f32`
 /// become infinite.
-fn recenter_positions(positions: Vec<DVec3>, faces: &Faces) -> (DVec3, Vec<Vec3>) {
+fn to_origin_and_offsets(positions: Vec<DVec3>, faces: &Faces) -> (DVec3, Vec<Vec3>) {
     let least = DVec3::splat(f64::from(f32::MIN));
     let place = |corner: &u32| positions.get(*corner as usize).copied().unwrap_or(DVec3::NAN);
     let held = |place: &DVec3| place.cmpge(least).all() && place.cmple(-least).all();
@@ -323,7 +323,7 @@ fn retain_used<T>(values: &mut Vec<T>, new_index: &[u32]) {
     values.retain(|_| indices.next().is_some_and(|index| *index != u32::MAX));
 }
 
-fn complete_normals(mesh: &mut TriangleMesh, token: &CancelToken) -> Result<(), Canceled> {
+fn normalize_and_complete_normals(mesh: &mut TriangleMesh, token: &CancelToken) -> Result<(), Canceled> {
     for normal in &mut mesh.normals {
         *normal = normal.as_dvec3().try_normalize().map_or(Vec3::ZERO, |unit| unit.as_vec3());
     }

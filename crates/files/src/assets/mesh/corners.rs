@@ -15,7 +15,10 @@ type VertexUvColorKey = (u32, [u32; 2], [u8; 3]);
 
 /// Creates one vertex for each combination of vertex, texture coordinates and color that occurs at a corner.
 /// New vertices keep the normal of the original vertex.
-pub(super) fn split_vertices_at_seams(parsed: &mut ParsedMesh, token: &CancelToken) -> Result<(), Canceled> {
+pub(super) fn split_vertices_by_uv_and_color(
+    parsed: &mut ParsedMesh,
+    token: &CancelToken,
+) -> Result<(), Canceled> {
     let (uvs, colors) = (std::mem::take(&mut parsed.corner_uvs), std::mem::take(&mut parsed.corner_colors));
     let vertices = parsed.positions.len();
     let is_in_range = |corner: &u32| (*corner as usize) < vertices;
@@ -42,11 +45,11 @@ pub(super) fn split_vertices_at_seams(parsed: &mut ParsedMesh, token: &CancelTok
             new_colors.push(color);
         }
     }
-    gather_values_in_place(&mut parsed.positions, &sources);
-    gather_values_in_place(&mut parsed.normals, &sources);
-    gather_values_in_place(&mut parsed.uvs, &sources);
-    gather_values_in_place(&mut parsed.second_uvs, &sources);
-    gather_values_in_place(&mut parsed.colors, &sources);
+    replace_with_gathered_values(&mut parsed.positions, &sources);
+    replace_with_gathered_values(&mut parsed.normals, &sources);
+    replace_with_gathered_values(&mut parsed.uvs, &sources);
+    replace_with_gathered_values(&mut parsed.second_uvs, &sources);
+    replace_with_gathered_values(&mut parsed.colors, &sources);
     if !uvs.is_empty() {
         parsed.uvs = new_uvs;
     }
@@ -60,7 +63,7 @@ pub(super) fn split_vertices_at_seams(parsed: &mut ParsedMesh, token: &CancelTok
 }
 
 /// Replaces `values` with the values at the indices in `sources`. An empty list stays empty.
-fn gather_values_in_place<T: Copy>(values: &mut Vec<T>, sources: &[usize]) {
+fn replace_with_gathered_values<T: Copy>(values: &mut Vec<T>, sources: &[usize]) {
     if !values.is_empty() {
         *values = sources.iter().map(|vertex| values[*vertex]).collect();
     }

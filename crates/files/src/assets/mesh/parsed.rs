@@ -170,7 +170,7 @@ pub(crate) struct ColorRangeDetector(ColorComponentExtremes);
 
 impl ColorRangeDetector {
     /// Adds a color and its byte offset.
-    pub(crate) fn add(&mut self, parts: [f64; 3], at: usize) {
+    pub(crate) fn add_color(&mut self, parts: [f64; 3], at: usize) {
         parts.into_iter().for_each(|part| self.0.add_component(part, at));
     }
 

@@ -124,7 +124,7 @@ struct MeshStream<'a> {
 
 impl MeshStream<'_> {
     /// Reads `count` bytes. Allocates memory only as data arrives, because `count` may be corrupt.
-    fn bytes(&mut self, count: usize) -> Result<Vec<u8>, AssetError> {
+    fn read_bytes(&mut self, count: usize) -> Result<Vec<u8>, AssetError> {
         let mut bytes = Vec::new();
         while bytes.len() < count {
             self.source.monitor.token.check_pause_and_cancel()?;
@@ -141,23 +141,23 @@ impl MeshStream<'_> {
         Ok(bytes)
     }
 
-    fn byte_array<const N: usize>(&mut self) -> Result<[u8; N], AssetError> {
+    fn read_byte_array<const N: usize>(&mut self) -> Result<[u8; N], AssetError> {
         let mut array = [0; N];
-        array.copy_from_slice(&self.bytes(N)?);
+        array.copy_from_slice(&self.read_bytes(N)?);
         Ok(array)
     }
 
-    fn u32(&mut self) -> Result<u32, AssetError> {
-        Ok(u32::from_le_bytes(self.byte_array()?))
+    fn read_u32(&mut self) -> Result<u32, AssetError> {
+        Ok(u32::from_le_bytes(self.read_byte_array()?))
     }
 
-    fn u64(&mut self) -> Result<u64, AssetError> {
-        Ok(u64::from_le_bytes(self.byte_array()?))
+    fn read_u64(&mut self) -> Result<u64, AssetError> {
+        Ok(u64::from_le_bytes(self.read_byte_array()?))
     }
 
     /// Reads a count, such as the number of vertices. `what` names the counted elements in errors.
-    fn count(&mut self, what: &str) -> Result<usize, AssetError> {
-        let count = self.u64()?;
+    fn read_count(&mut self, what: &str) -> Result<usize, AssetError> {
+        let count = self.read_u64()?;
         if count > MAX_COUNT {
             let reason = format!("it claims {count} {what}; the limit is {MAX_COUNT}");
             return Err(self.source.malformed_error_without_line(reason));
@@ -168,7 +168,7 @@ impl MeshStream<'_> {
     /// Skips a null-terminated name.
     fn skip_terminated_name(&mut self) -> Result<(), AssetError> {
         for _ in 0..MAX_NAME_BYTES {
-            if self.byte_array::<1>()? == [0] {
+            if self.read_byte_array::<1>()? == [0] {
                 return Ok(());
             }
         }
@@ -176,9 +176,9 @@ impl MeshStream<'_> {
     }
 
     /// Reads `count` floating-point numbers in single or double precision.
-    fn floats(&mut self, count: usize, is_double: bool) -> Result<Vec<f64>, AssetError> {
+    fn read_floats(&mut self, count: usize, is_double: bool) -> Result<Vec<f64>, AssetError> {
         let size = if is_double { 8 } else { 4 };
-        let bytes = self.bytes(count * size)?;
+        let bytes = self.read_bytes(count * size)?;
         let single =
             |bytes: &[u8]| bytes.first_chunk().map_or(0.0, |bytes| f64::from(f32::from_le_bytes(*bytes)));
         let double = |bytes: &[u8]| bytes.first_chunk().map_or(0.0, |bytes| f64::from_le_bytes(*bytes));
@@ -188,8 +188,8 @@ impl MeshStream<'_> {
             .collect())
     }
 
-    fn indices(&mut self, count: usize) -> Result<Vec<u32>, AssetError> {
-        let bytes = self.bytes(count * 4)?;
+    fn read_indices(&mut self, count: usize) -> Result<Vec<u32>, AssetError> {
+        let bytes = self.read_bytes(count * 4)?;
         let (indices, _) = bytes.as_chunks::<4>();
         Ok(indices.iter().map(|bytes| u32::from_le_bytes(*bytes)).collect())
     }
@@ -203,7 +203,7 @@ fn add_mesh(source: &MeshFileBytes<'_>, offset: usize, parsed: &mut ParsedMesh) 
     source.report_progress(offset)?;
     let compressed = source.bytes.get(offset + HEADER_BYTES..).unwrap_or_default();
     let mut stream = MeshStream { source, decoder: ZlibDecoder::new(compressed) };
-    let flags = stream.u32()?;
+    let flags = stream.read_u32()?;
     let first = parsed.positions.len() as u32;
     let faces = match version {
         5 => add_vertices_of_version_5(&mut stream, flags, parsed)?,
@@ -233,17 +233,19 @@ fn add_vertices(
     if version == 4 {
         stream.skip_terminated_name()?;
     }
-    let (vertices, triangles) = (stream.count("vertices")?, stream.count("triangles")?);
+    let (vertices, triangles) = (stream.read_count("vertices")?, stream.read_count("triangles")?);
     let is_double = flags & IS_DOUBLE != 0;
-    let positions = stream.floats(3 * vertices, is_double)?;
-    let normals = if flags & HAS_NORMALS != 0 { stream.floats(3 * vertices, is_double)? } else { Vec::new() };
-    let uvs = if flags & HAS_COORDINATES != 0 { stream.floats(2 * vertices, is_double)? } else { Vec::new() };
+    let positions = stream.read_floats(3 * vertices, is_double)?;
+    let normals =
+        if flags & HAS_NORMALS != 0 { stream.read_floats(3 * vertices, is_double)? } else { Vec::new() };
+    let uvs =
+        if flags & HAS_COORDINATES != 0 { stream.read_floats(2 * vertices, is_double)? } else { Vec::new() };
     if flags & HAS_COLORS != 0 {
-        stream.floats(3 * vertices, is_double)?;
+        stream.read_floats(3 * vertices, is_double)?;
         parsed.warnings.push("vertex colors are ignored".to_owned());
     }
     append_vertices(parsed, vertices, &positions, &normals, &uvs);
-    stream.indices(3 * triangles)
+    stream.read_indices(3 * triangles)
 }
 
 /// Adds the vertices of a mesh in version 5, in which a vertex is a record of eight numbers. Returns the
@@ -253,14 +255,14 @@ fn add_vertices_of_version_5(
     flags: u32,
     parsed: &mut ParsedMesh,
 ) -> Result<Vec<u32>, AssetError> {
-    let length = stream.u32()? as usize;
+    let length = stream.read_u32()? as usize;
     if length > MAX_NAME_BYTES {
         return Err(stream.source.malformed_error_without_line("the name of a mesh is too long"));
     }
-    stream.bytes(length)?;
-    let (vertices, triangles) = (stream.count("vertices")?, stream.count("triangles")?);
-    let (_, _) = (stream.count("surface points")?, stream.count("normals")?);
-    let records = stream.floats(8 * vertices, false)?;
+    stream.read_bytes(length)?;
+    let (vertices, triangles) = (stream.read_count("vertices")?, stream.read_count("triangles")?);
+    let (_, _) = (stream.read_count("surface points")?, stream.read_count("normals")?);
+    let records = stream.read_floats(8 * vertices, false)?;
     let part = |start: usize, length: usize| -> Vec<f64> {
         records.chunks_exact(8).flat_map(|record| record[start..start + length].iter().copied()).collect()
     };
@@ -268,7 +270,7 @@ fn add_vertices_of_version_5(
     let normals = if has_normals { part(3, 3) } else { Vec::new() };
     let uvs = if flags & HAS_COORDINATES_5 != 0 { part(6, 2) } else { Vec::new() };
     append_vertices(parsed, vertices, &part(0, 3), &normals, &uvs);
-    let faces = stream.indices(4 * triangles)?;
+    let faces = stream.read_indices(4 * triangles)?;
     Ok(faces.chunks_exact(4).flat_map(|face| face[..3].iter().copied()).collect())
 }
 

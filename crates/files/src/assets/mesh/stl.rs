@@ -7,7 +7,7 @@
 
 use super::assemble::{assemble, assemble_text_mesh};
 use super::parsed::{Faces, ParsedMesh};
-use super::text::{Cursor, convert_mac_line_ends, expected_message};
+use super::text::{TextCursor, convert_mac_line_ends, expected_message};
 use super::{AssetError, LoadedMesh, MeshFileBytes};
 use crate::assets::read;
 use crate::math::DVec3;
@@ -30,7 +30,7 @@ pub(super) fn parse(source: &MeshFileBytes<'_>) -> Result<LoadedMesh, AssetError
             let bytes = convert_mac_line_ends(source.bytes);
             let source = MeshFileBytes { bytes: &bytes, ..*source };
             let mut reader =
-                TextReader { source, cursor: Cursor::new(source.bytes, 0), polygons: Vec::new() };
+                TextReader { source, cursor: TextCursor::new(source.bytes, 0), polygons: Vec::new() };
             let parsed = ParsedMesh { has_separate_corners: true, ..reader.read()? };
             assemble_text_mesh(&source, parsed, |face| reader.face_offset_unless_triangle(face))
         }
@@ -143,7 +143,7 @@ fn add_corner(parsed: &mut ParsedMesh, position: DVec3) {
 /// Parser for text STL files.
 struct TextReader<'a> {
     source: MeshFileBytes<'a>,
-    cursor: Cursor<'a>,
+    cursor: TextCursor<'a>,
     /// Indices of faces with more than 3 corners, each with the byte offset of its loop.
     polygons: Vec<(usize, usize)>,
 }
@@ -210,7 +210,7 @@ impl TextReader<'_> {
         Ok(parsed)
     }
 
-    fn fail_with_line<T>(&self, at: Cursor<'_>, reason: impl Into<String>) -> Result<T, AssetError> {
+    fn fail_with_line<T>(&self, at: TextCursor<'_>, reason: impl Into<String>) -> Result<T, AssetError> {
         let end = self.source.bytes.trim_ascii_end().len();
         Err(self.source.malformed_error_with_line(at.offset().min(end), reason))
     }
@@ -235,14 +235,14 @@ impl TextReader<'_> {
         while bytes.get(at).is_some_and(|byte| *byte != b'\n') {
             let word = bytes[at..].iter().position(is_blank).map_or(&bytes[at..], |end| &bytes[at..at + end]);
             if word.eq_ignore_ascii_case(b"facet") {
-                let mut ahead = Cursor::new(bytes, at + word.len());
+                let mut ahead = TextCursor::new(bytes, at + word.len());
                 if ahead.skip_to_word_across_lines() && ahead.take_word().eq_ignore_ascii_case(b"normal") {
                     break;
                 }
             }
             at += word.len().max(1);
         }
-        self.cursor = Cursor::new(bytes, at);
+        self.cursor = TextCursor::new(bytes, at);
     }
 
     /// Skips a normal, which may contain words that are not numbers.

@@ -35,14 +35,14 @@ pub(super) fn decode_line(line: &[u8]) -> Cow<'_, str> {
 }
 
 /// Lines of a text file, read one at a time. If reading fails, the lines end early.
-pub(super) struct Lines {
+pub(super) struct LineReader {
     reader: BufReader<File>,
     /// Last byte of each line: a line feed, or a carriage return in classic Mac OS files.
     end: u8,
     line: Vec<u8>,
 }
 
-impl Lines {
+impl LineReader {
     /// Number of buffered bytes.
     const BUFFER: usize = 1 << 16;
     /// Maximum length of a line. Longer lines are split.
@@ -95,12 +95,12 @@ impl Lines {
 
 /// A cursor in a text file.
 #[derive(Clone, Copy)]
-pub(super) struct Cursor<'a> {
+pub(super) struct TextCursor<'a> {
     bytes: &'a [u8],
     at: usize,
 }
 
-impl<'a> Cursor<'a> {
+impl<'a> TextCursor<'a> {
     pub(super) fn new(bytes: &'a [u8], at: usize) -> Self {
         Self { bytes, at }
     }
@@ -205,7 +205,7 @@ mod tests {
 
     #[test]
     fn blanks_and_comments_separate_words() {
-        let mut cursor = Cursor::new(b" ab#c d\n\r\n # e\nf", 0);
+        let mut cursor = TextCursor::new(b" ab#c d\n\r\n # e\nf", 0);
         assert!(cursor.skip_to_word_across_lines());
         assert_eq!(cursor.take_word(), b"ab");
         assert!(!cursor.skip_to_word_in_line());
@@ -224,7 +224,7 @@ mod tests {
 
     #[test]
     fn numbers_must_span_the_whole_word() {
-        let float = |text: &'static str| Cursor::new(text.as_bytes(), 0).take_float();
+        let float = |text: &'static str| TextCursor::new(text.as_bytes(), 0).take_float();
         assert_eq!(float("1.5e-3 "), Some(1.5e-3));
         assert_eq!(float("-.5#"), Some(-0.5));
         assert_eq!(float("+2"), Some(2.0));
@@ -232,7 +232,7 @@ mod tests {
         assert!(float("nan").is_some_and(f64::is_nan));
         assert_eq!(float("1.5x"), None);
         assert_eq!(float(""), None);
-        let integer = |text: &'static str| Cursor::new(text.as_bytes(), 0).take_integer();
+        let integer = |text: &'static str| TextCursor::new(text.as_bytes(), 0).take_integer();
         assert_eq!(integer("-12\n"), Some(-12));
         assert_eq!(integer("1.0"), None);
         assert_eq!(integer("-"), None);

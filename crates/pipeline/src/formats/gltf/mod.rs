@@ -130,7 +130,7 @@ fn scene_of_file(
     if let SceneAssetLocation::Folder(_) = asset_location {
         images.into_iter().try_for_each(|image| container.check_image_header(image, token))?;
     }
-    let hash = container.file_hash();
+    let hash = container.main_file_hash();
     Ok((ForeignScene { document, hash, companions, notes, substitutions }, assets))
 }
 

@@ -1,6 +1,8 @@
-//! Limits the number of attributes of an element before the file is parsed.
+//! Tags in the text of an XML file: where names are, and whether a tag has too many attributes to be parsed.
 
 use std::ops::Range;
+
+use roxmltree::Node;
 
 /// Maximum number of attributes of an element. The parser compares each with all others.
 pub(super) const MAX_ATTRIBUTES: usize = 200;
@@ -49,6 +51,15 @@ fn end_of_tag(tag: &[u8]) -> Option<TagEndOrOverflow> {
         }
         position = at + 2 + tag[at + 1..].iter().position(|byte| *byte == tag[at])?;
     }
+}
+
+/// Span of the element's name in its start tag.
+pub(super) fn element_name_span(text: &str, node: &Node<'_, '_>, start: usize) -> Range<usize> {
+    let range = node.range();
+    let after = (range.start + 1).min(range.end);
+    let name = text.get(after..range.end).unwrap_or_default();
+    let length = name.find(|c: char| c.is_whitespace() || c == '>' || c == '/').unwrap_or(name.len());
+    start + after..start + after + length
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use roxmltree::{Document, Node, ParsingOptions, TextPos};
 
-use super::tags::{MAX_ATTRIBUTES, find_overfull_tag};
+use super::tags::{MAX_ATTRIBUTES, element_name_span, find_overfull_tag};
 use crate::assets::AssetError;
 use crate::control::CancelToken;
 use crate::formats::foreign::sources::SourceReader;
@@ -436,15 +436,6 @@ fn is_old_version(version: &str) -> bool {
         .next()
         .and_then(|major| major.parse::<u32>().ok())
         .is_some_and(|major| major < 2)
-}
-
-/// Span of the element's name in its start tag.
-fn element_name_span(text: &str, node: &Node<'_, '_>, start: usize) -> Range<usize> {
-    let range = node.range();
-    let after = (range.start + 1).min(range.end);
-    let name = text.get(after..range.end).unwrap_or_default();
-    let length = name.find(|c: char| c.is_whitespace() || c == '>' || c == '/').unwrap_or(name.len());
-    start + after..start + after + length
 }
 
 /// Byte offset of a position. Rows and columns start at 1, and columns count characters.

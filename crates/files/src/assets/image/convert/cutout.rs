@@ -22,10 +22,10 @@ pub(super) fn texels_with_alpha(
     let Some(alpha) =
         alpha_sample_index(&image, metadata).filter(|alpha| !is_channel_filled_with(&image, *alpha, 1.0))
     else {
-        return super::texels(image, curve.encoding_of_opaque_image(), metadata);
+        return super::image_to_texels(image, curve.encoding_of_opaque_image(), metadata);
     };
     let (width, height) = (image.width(), image.height());
-    let space = ColorEncoding::CutOut(curve).color_space(metadata);
+    let space = ColorEncoding::CutOut(curve).source_color_space(metadata);
     let is_direct = space.is_default() && metadata.alpha != AlphaInterpretation::Premultiplied;
     let mut unusable = 0;
     let data = match &image {

@@ -116,7 +116,7 @@ fn is_channel_filled_with(image: &DynamicImage, index: usize, value: f32) -> boo
 }
 
 /// Returns the warning, if any, about an opacity read from an alpha channel that is constant or not decoded.
-pub(super) fn constant_alpha_warning(
+pub(super) fn opacity_from_alpha_warning(
     image: &DynamicImage,
     encoding: ColorEncoding,
     metadata: &ImageColorMetadata,
@@ -155,7 +155,11 @@ pub(super) const OPAQUE: &str =
     "alpha is 1 everywhere, so the surface is opaque; set `channel` to use a color channel as the opacity";
 
 /// Converts an image to texels.
-pub(super) fn texels(image: DynamicImage, encoding: ColorEncoding, metadata: &ImageColorMetadata) -> Texels {
+pub(super) fn image_to_texels(
+    image: DynamicImage,
+    encoding: ColorEncoding,
+    metadata: &ImageColorMetadata,
+) -> Texels {
     // Convert formats added in later versions of `image`.
     let image = match image.color() {
         ColorType::L8 | ColorType::La8 | ColorType::Rgb8 | ColorType::Rgba8 => image,
@@ -173,7 +177,7 @@ pub(super) fn texels(image: DynamicImage, encoding: ColorEncoding, metadata: &Im
     let (width, height) = (image.width(), image.height());
     let channels = channel_count(&image);
     let mut unusable = 0;
-    if !encoding.color_space(metadata).is_default() {
+    if !encoding.source_color_space(metadata).is_default() {
         let data = convert_color_space(&image, encoding, metadata, &mut unusable);
         return Texels { width, height, data, unusable };
     }
@@ -273,7 +277,7 @@ fn convert_color_space(
         };
         TexelData::Float(samples.chunks_exact(channels).map(&mut texel).collect())
     }
-    let space = encoding.color_space(metadata);
+    let space = encoding.source_color_space(metadata);
     let is_raw = encoding == ColorEncoding::Raw;
     with_samples!(image, samples => {
         convert_samples_color_space(samples, channel_count(image), &space, is_raw, unusable)

@@ -141,13 +141,14 @@ fn scalar_texels_from_samples<T: Sample>(
 
 #[cfg(test)]
 mod tests {
-    use super::super::texels;
+    use super::super::image_to_texels;
     use super::*;
     use crate::assets::image::ColorEncoding;
     use ::image::ImageBuffer;
 
     fn number(image: DynamicImage, of: ChannelSelector, is_srgb: bool) -> f32 {
-        let texels = texels(image, ColorEncoding::Number { of, is_srgb }, &ImageColorMetadata::default());
+        let texels =
+            image_to_texels(image, ColorEncoding::Number { of, is_srgb }, &ImageColorMetadata::default());
         let value = texels.get(0, 0);
         assert!(value.x == value.y && value.y == value.z, "{value}");
         value.x
@@ -184,14 +185,14 @@ mod tests {
         let float =
             || DynamicImage::ImageRgb32F(ImageBuffer::from_pixel(1, 1, ::image::Rgb([2.0, f32::NAN, -1.0])));
         assert_eq!(number(float(), of(Channel::Red), false), 2.0);
-        let broken = texels(
+        let broken = image_to_texels(
             float(),
             ColorEncoding::Number { of: of(Channel::Green), is_srgb: false },
             &ImageColorMetadata::default(),
         );
         assert_eq!((broken.get(0, 0).x, broken.unusable), (0.0, 1));
         // A pixel with several unusable samples is counted once.
-        let broken = texels(
+        let broken = image_to_texels(
             float(),
             ColorEncoding::Number { of: ChannelSelector::Luminance, is_srgb: false },
             &ImageColorMetadata::default(),

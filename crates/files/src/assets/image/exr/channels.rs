@@ -109,7 +109,7 @@ type LayerMap = BTreeMap<String, LayerChannels>;
 pub(super) fn choose_channels(headers: &[Header]) -> Option<ChosenChannels> {
     let mut parts: Vec<LayerMap> =
         headers.iter().enumerate().map(|(part, header)| layers_by_name(part, header)).collect();
-    let across = layers_across_parts(headers);
+    let across = layers_of_single_channel_parts(headers);
     // The X channel that matches a Y channel may be in another part.
     for layers in &mut parts {
         for (name, layer) in layers {
@@ -150,7 +150,7 @@ fn add_part_channels_to_layers(part: usize, header: &Header, layers: &mut LayerM
 }
 
 /// Assembles layers from single-channel parts.
-fn layers_across_parts(headers: &[Header]) -> LayerMap {
+fn layers_of_single_channel_parts(headers: &[Header]) -> LayerMap {
     let mut layers = LayerMap::new();
     for (part, header) in single_channel_parts(headers) {
         add_part_channels_to_layers(part, header, &mut layers);

@@ -45,12 +45,12 @@ impl<R: BufRead + Seek> ExrDecoder<R> {
             return Err(decoding_error(describe_unusable_channels(reader.headers())));
         };
         let decompressor = BlockDecompressor::new(reader.meta_data(), &samplings);
-        check_samplings(decompressor.headers(), channels).map_err(decoding_error)?;
+        check_samplings(decompressor.headers_with_subsampling(), channels).map_err(decoding_error)?;
         let needed =
             channels.all().map(|channel| decompressed_block_size(&reader.headers()[channel.part])).max();
-        let chroma_bytes = channels
-            .as_luminance_chroma()
-            .map_or(0, |planes| LuminanceChromaPlanes::memory_bytes(decompressor.headers(), planes));
+        let chroma_bytes = channels.as_luminance_chroma().map_or(0, |planes| {
+            LuminanceChromaPlanes::memory_bytes(decompressor.headers_with_subsampling(), planes)
+        });
         if needed.unwrap_or_default().saturating_add(chroma_bytes) > memory_bytes {
             return Err(ImageError::Limits(LimitError::from_kind(LimitErrorKind::InsufficientMemory)));
         }
@@ -63,7 +63,7 @@ impl<R: BufRead + Seek> ExrDecoder<R> {
             ImageColorMetadata { alpha: AlphaInterpretation::Premultiplied, ..ImageColorMetadata::default() };
         if let Some(primaries) = primaries(self.header()) {
             match primaries.to_rec_709_matrix() {
-                Some(matrix) => metadata.space = ColorSpace::from_matrix_with_default_curves(matrix),
+                Some(matrix) => metadata.space = ColorSpace::from_rec_709_matrix(matrix),
                 None => metadata.add_warning(DEGENERATE_CHROMATICITIES),
             }
         }
@@ -145,7 +145,7 @@ impl<R: BufRead + Seek> ImageDecoder for ExrDecoder<R> {
     fn read_image(self, samples: &mut [u8]) -> ImageResult<()> {
         let channels = self.channels;
         let mut decompressor = BlockDecompressor::new(self.reader.meta_data(), &self.samplings);
-        let headers = decompressor.headers().to_vec();
+        let headers = decompressor.headers_with_subsampling().to_vec();
         let mut image = BlockAssembler {
             headers: &headers,
             channels,

@@ -149,7 +149,7 @@ impl BlockDecompressor {
         Self(meta)
     }
 
-    pub(super) fn headers(&self) -> &[Header] {
+    pub(super) fn headers_with_subsampling(&self) -> &[Header] {
         &self.0.headers
     }
 

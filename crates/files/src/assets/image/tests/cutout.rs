@@ -14,7 +14,7 @@ fn bytes(pixels: &[[u8; 4]]) -> DynamicImage {
 }
 
 fn texels(image: DynamicImage, encoding: ColorEncoding, alpha: AlphaInterpretation) -> Texels {
-    convert::texels(image, encoding, &ImageColorMetadata { alpha, ..ImageColorMetadata::default() })
+    convert::image_to_texels(image, encoding, &ImageColorMetadata { alpha, ..ImageColorMetadata::default() })
 }
 
 #[test]
@@ -71,7 +71,7 @@ fn masks_without_alpha_use_the_luminance() {
     }
     let warning = |image: DynamicImage, of| {
         let encoding = ColorEncoding::Number { of, is_srgb: false };
-        convert::constant_alpha_warning(&image, encoding, &ImageColorMetadata::default())
+        convert::opacity_from_alpha_warning(&image, encoding, &ImageColorMetadata::default())
     };
     assert_eq!(warning(gray(), mask(false)), Some(convert::LUMINANCE_USED));
     assert_eq!(warning(red(), mask(false)), Some(convert::OPAQUE));

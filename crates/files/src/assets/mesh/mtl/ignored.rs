@@ -3,9 +3,9 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use super::map::{Map, MapKind};
+use super::map::{MapKind, MtlMap};
 use super::material::{is_opaque_despite_tr, to_file_material};
-use super::statements::{MtlColorKind, MtlNumberKind};
+use super::statements::{MtlColorParameter, MtlScalarParameter};
 use super::{MtlMaterial, WithLine};
 use crate::assets::{FileMaterial, FileMaterialKind, PhysicalMaterial};
 use crate::math::Vec3;
@@ -124,7 +124,7 @@ fn warn_about_approximations(
         11.. => add(model, UNKNOWN_MODEL),
         1..=9 => {}
     }
-    let ior = found.number_with_line(MtlNumberKind::Ior);
+    let ior = found.number_with_line(MtlScalarParameter::Ior);
     match converted.kind() {
         FileMaterialKind::Glass if converted.ior <= 1.0 => add(model, INVISIBLE_GLASS),
         FileMaterialKind::Glass | FileMaterialKind::Principled(_)
@@ -142,7 +142,7 @@ fn warn_about_approximations(
         | FileMaterialKind::Glass => {}
     }
     if converted.emission != Vec3::ZERO && !converted.emits() {
-        let emission = found.color(MtlColorKind::Emission);
+        let emission = found.color(MtlColorParameter::Emission);
         if emission.is_some() {
             add(line_of_value(emission), &no_effect_on_material_warning("Ke", converted.kind()));
         }
@@ -155,14 +155,14 @@ fn warn_about_opacity(
     converted: &FileMaterial,
     add: &mut impl FnMut(Option<usize>, &str),
 ) {
-    if let Some(at) = found.color(MtlColorKind::Filter).filter(|at| at.value != [1.0; 3]) {
+    if let Some(at) = found.color(MtlColorParameter::Filter).filter(|at| at.value != [1.0; 3]) {
         add(Some(at.line), FILTER_IGNORED);
     }
     if converted.is_glass() {
         return;
     }
     let [opacity, transparency] =
-        [MtlNumberKind::Dissolve, MtlNumberKind::Transparency].map(|of| found.number_with_line(of));
+        [MtlScalarParameter::Dissolve, MtlScalarParameter::Transparency].map(|of| found.number_with_line(of));
     if converted.opacity_texture.is_some() {
         let given = opacity.or(transparency).filter(|_| converted.opacity < 1.0);
         given.iter().for_each(|at| add(Some(at.line), OPACITY_MAP));
@@ -184,7 +184,8 @@ fn warn_about_unrenderable_reflectance(
     converted: &FileMaterial,
     add: &mut impl FnMut(Option<usize>, &str),
 ) {
-    let (diffuse, specular) = (found.color(MtlColorKind::Diffuse), found.color(MtlColorKind::Specular));
+    let (diffuse, specular) =
+        (found.color(MtlColorParameter::Diffuse), found.color(MtlColorParameter::Specular));
     let kd = match converted.diffuse_texture {
         Some(_) => 0.0,
         None => converted.diffuse.max_element(),
@@ -213,7 +214,8 @@ fn warn_about_highlight_and_energy_gain(
     converted: &FileMaterial,
     add: &mut impl FnMut(Option<usize>, &str),
 ) {
-    let (diffuse, specular) = (found.color(MtlColorKind::Diffuse), found.color(MtlColorKind::Specular));
+    let (diffuse, specular) =
+        (found.color(MtlColorParameter::Diffuse), found.color(MtlColorParameter::Specular));
     let specular_map = found.map(MapKind::Specular);
     let is_matte = matches!(converted.illumination_model, Some(0 | 1));
     let has_strength = converted.specular != Vec3::ZERO || specular_map.is_some();
@@ -238,17 +240,17 @@ fn warn_about_ineffective_pbr(
     converted: &FileMaterial,
     add: &mut impl FnMut(Option<usize>, &str),
 ) {
-    let nonzero = |number: MtlNumberKind| found.number_with_line(number).filter(|at| at.value != 0.0);
-    for number in [MtlNumberKind::Sheen, MtlNumberKind::AnisotropyRotation] {
+    let nonzero = |number: MtlScalarParameter| found.number_with_line(number).filter(|at| at.value != 0.0);
+    for number in [MtlScalarParameter::Sheen, MtlScalarParameter::AnisotropyRotation] {
         if let Some(at) = nonzero(number) {
             add(Some(at.line), &ignored_statement_warning(number.keyword()));
         }
     }
     let is_metal = converted.physical.as_ref().is_some_and(PhysicalMaterial::is_metal);
-    if let Some(at) = nonzero(MtlNumberKind::Anisotropy).filter(|_| !is_metal || converted.is_glass()) {
+    if let Some(at) = nonzero(MtlScalarParameter::Anisotropy).filter(|_| !is_metal || converted.is_glass()) {
         add(Some(at.line), ANISOTROPY_OF_METALS);
     }
-    for number in [MtlNumberKind::Metallic, MtlNumberKind::Coat] {
+    for number in [MtlScalarParameter::Metallic, MtlScalarParameter::Coat] {
         if let Some(at) = nonzero(number).filter(|_| converted.is_glass()) {
             add(Some(at.line), &no_effect_on_material_warning(number.keyword(), converted.kind()));
         }
@@ -260,7 +262,7 @@ fn warn_about_map(
     found: &MtlMaterial,
     converted: &FileMaterial,
     kind: MapKind,
-    map: &Map,
+    map: &MtlMap,
     add: &mut impl FnMut(Option<usize>, &str),
 ) {
     let line = Some(map.line);

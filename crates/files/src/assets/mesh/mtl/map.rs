@@ -113,7 +113,7 @@ impl MapKind {
 
 /// A map and its options, as given in the file.
 #[derive(Clone, Debug)]
-pub(super) struct Map {
+pub(super) struct MtlMap {
     pub(super) line: usize,
     repeat: [f64; 2],
     offset: [f64; 2],
@@ -129,7 +129,7 @@ pub(super) struct Map {
     name: String,
 }
 
-impl Map {
+impl MtlMap {
     /// Parses the text after the keyword, or returns `None` if it has no file name.
     pub(super) fn parse(text: &str) -> Option<Self> {
         let mut map = Self {
@@ -144,7 +144,7 @@ impl Map {
             name: String::new(),
         };
         let mut rest = MapArgumentCursor(text.trim());
-        while let Some(option) = rest.next_option() {
+        while let Some(option) = rest.next_option_name() {
             let start = rest.0;
             if !map.parse_option_arguments(&option, &mut rest) {
                 let arguments = start[..start.len() - rest.0.len()].trim_end();
@@ -277,7 +277,7 @@ struct MapArgumentCursor<'a>(&'a str);
 impl<'a> MapArgumentCursor<'a> {
     /// Consumes an option and returns it in lowercase. An unknown option is recognized only if a number or a
     /// switch follows it. Any other word starts the file name, even if it begins with a dash.
-    fn next_option(&mut self) -> Option<String> {
+    fn next_option_name(&mut self) -> Option<String> {
         const OPTIONS: [&str; 14] = [
             "-s",
             "-o",

@@ -13,7 +13,7 @@ use crate::assets::{AssetError, FileHash};
 pub(super) use ignored::{MtlWarning, collect_warnings};
 pub(super) use map::{encode_utf8_and_latin1_paths, first_existing_or_first, successively_strip_comments};
 pub(super) use material::to_file_material;
-use statements::{MtlColorKind, MtlNumberKind, Statement};
+use statements::{MtlColorParameter, MtlScalarParameter, Statement};
 
 /// Maximum size of an MTL file.
 pub(super) const FILE_LIMIT: u64 = 64 << 20;
@@ -33,10 +33,10 @@ pub(super) struct MtlMaterial {
     pub(super) name: String,
     /// Line of the `newmtl` statement.
     line: usize,
-    colors: [Option<WithLine<[f64; 3]>>; MtlColorKind::ALL.len()],
-    numbers: [Option<WithLine<f64>>; MtlNumberKind::ALL.len()],
+    colors: [Option<WithLine<[f64; 3]>>; MtlColorParameter::ALL.len()],
+    numbers: [Option<WithLine<f64>>; MtlScalarParameter::ALL.len()],
     illumination: Option<WithLine<u8>>,
-    maps: Vec<(map::MapKind, map::Map)>,
+    maps: Vec<(map::MapKind, map::MtlMap)>,
     /// Statements that have no effect.
     ignored: Vec<MtlWarning>,
 }
@@ -49,20 +49,20 @@ struct WithLine<T> {
 }
 
 impl MtlMaterial {
-    fn color(&self, color: MtlColorKind) -> Option<WithLine<[f64; 3]>> {
+    fn color(&self, color: MtlColorParameter) -> Option<WithLine<[f64; 3]>> {
         self.colors[color as usize]
     }
 
-    fn number(&self, number: MtlNumberKind) -> Option<f64> {
+    fn number(&self, number: MtlScalarParameter) -> Option<f64> {
         self.number_with_line(number).map(|number| number.value)
     }
 
-    fn number_with_line(&self, number: MtlNumberKind) -> Option<WithLine<f64>> {
+    fn number_with_line(&self, number: MtlScalarParameter) -> Option<WithLine<f64>> {
         self.numbers[number as usize]
     }
 
     /// The last map of this kind.
-    fn map(&self, kind: map::MapKind) -> Option<&map::Map> {
+    fn map(&self, kind: map::MapKind) -> Option<&map::MtlMap> {
         self.maps.iter().rev().find(|(found, _)| *found == kind).map(|(_, map)| map)
     }
 

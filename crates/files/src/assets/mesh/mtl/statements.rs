@@ -1,11 +1,11 @@
 //! Parses lines from an MTL file. Keywords are case-insensitive.
 
-use super::map::{Map, MapKind, ignored_option_warning};
+use super::map::{MapKind, MtlMap, ignored_option_warning};
 use crate::math::limits::MAX_MAGNITUDE;
 
 /// A color statement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum MtlColorKind {
+pub(super) enum MtlColorParameter {
     Ambient,
     Diffuse,
     Specular,
@@ -14,7 +14,7 @@ pub(super) enum MtlColorKind {
     Filter,
 }
 
-impl MtlColorKind {
+impl MtlColorParameter {
     /// All colors with their keywords, in enum order.
     pub(super) const ALL: [(Self, &'static str); 5] = [
         (Self::Ambient, "Ka"),
@@ -27,7 +27,7 @@ impl MtlColorKind {
 
 /// A statement with a single number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum MtlNumberKind {
+pub(super) enum MtlScalarParameter {
     Shininess,
     Ior,
     Dissolve,
@@ -41,7 +41,7 @@ pub(super) enum MtlNumberKind {
     AnisotropyRotation,
 }
 
-impl MtlNumberKind {
+impl MtlScalarParameter {
     /// All numbers with their keywords, in enum order.
     pub(super) const ALL: [(Self, &'static str); 11] = [
         (Self::Shininess, "Ns"),
@@ -86,10 +86,10 @@ pub(super) enum Statement {
     /// A statement that is ignored with a warning.
     Ignored,
     New(String),
-    Color(MtlColorKind, [f64; 3]),
-    Number(MtlNumberKind, f64),
+    Color(MtlColorParameter, [f64; 3]),
+    Number(MtlScalarParameter, f64),
     Illumination(u8),
-    Map(MapKind, Map),
+    Map(MapKind, MtlMap),
 }
 
 /// Parses a line, adding a warning for each unusable part.
@@ -105,14 +105,14 @@ pub(super) fn parse_line(line: &str, warnings: &mut Vec<String>) -> Result<State
         let name = (!rest.is_empty()).then(|| rest.to_owned());
         return name.map(Statement::New).ok_or_else(|| expected_arguments_message("newmtl", "a name"));
     }
-    if let Some((color, _)) = MtlColorKind::ALL.into_iter().find(|(_, name)| is(name)) {
+    if let Some((color, _)) = MtlColorParameter::ALL.into_iter().find(|(_, name)| is(name)) {
         return parse_color(keyword, color, rest, warnings);
     }
-    if let Some((number, _)) = MtlNumberKind::ALL.into_iter().find(|(_, name)| is(name)) {
+    if let Some((number, _)) = MtlScalarParameter::ALL.into_iter().find(|(_, name)| is(name)) {
         return parse_number(keyword, number, rest, warnings);
     }
     if let Some(kind) = MapKind::from_keyword(keyword) {
-        return match Map::parse(rest) {
+        return match MtlMap::parse(rest) {
             Some(map) => Ok(Statement::Map(kind, map)),
             None => Err(expected_arguments_message(keyword, "a file name")),
         };
@@ -197,7 +197,7 @@ pub(super) fn outside_gamut_warning(keyword: &str) -> String {
 /// Parses a color: three numbers or a single gray value.
 fn parse_color(
     keyword: &str,
-    color: MtlColorKind,
+    color: MtlColorParameter,
     rest: &str,
     warnings: &mut Vec<String>,
 ) -> Result<Statement, String> {
@@ -219,8 +219,8 @@ fn parse_color(
     warn_about_excess(words, 3, keyword, warnings);
     let values = match (color, is_xyz) {
         // These colors have no effect.
-        (MtlColorKind::Ambient | MtlColorKind::Filter, _) => values,
-        (MtlColorKind::Diffuse | MtlColorKind::Specular | MtlColorKind::Emission, true) => {
+        (MtlColorParameter::Ambient | MtlColorParameter::Filter, _) => values,
+        (MtlColorParameter::Diffuse | MtlColorParameter::Specular | MtlColorParameter::Emission, true) => {
             /// Maximum rounding error for colors at the edge of the gamut.
             const TINY: f64 = 1e-3;
             let rgb = xyz_to_rgb(values);
@@ -229,7 +229,7 @@ fn parse_color(
             }
             rgb.map(|part| part.clamp(0.0, MAX_MAGNITUDE))
         }
-        (MtlColorKind::Diffuse | MtlColorKind::Specular | MtlColorKind::Emission, false) => {
+        (MtlColorParameter::Diffuse | MtlColorParameter::Specular | MtlColorParameter::Emission, false) => {
             // Report only the first component.
             let mut reported = Vec::new();
             let part = |part: usize| {
@@ -256,13 +256,13 @@ fn xyz_to_rgb([x, y, z]: [f64; 3]) -> [f64; 3] {
 /// Parses a number. Treats `d -halo` like `d`, with a warning.
 fn parse_number(
     keyword: &str,
-    number: MtlNumberKind,
+    number: MtlScalarParameter,
     rest: &str,
     warnings: &mut Vec<String>,
 ) -> Result<Statement, String> {
     let words = words_before_comment(rest);
     let words = match words.as_slice() {
-        ["-halo", words @ ..] if number == MtlNumberKind::Dissolve => {
+        ["-halo", words @ ..] if number == MtlScalarParameter::Dissolve => {
             warnings.push(ignored_option_warning("-halo"));
             words
         }

@@ -18,7 +18,7 @@ pub(super) struct FaceRun {
 }
 
 /// Adds the faces from all runs. Within an object, every distinct combination of indices becomes a vertex.
-pub(super) fn build_faces(statements: &ParsedObj, runs: &[FaceRun], parsed: &mut ParsedMesh) {
+pub(super) fn build_vertices_and_faces(statements: &ParsedObj, runs: &[FaceRun], parsed: &mut ParsedMesh) {
     let has = |part: usize| statements.corners.iter().any(|corner| corner[part] != NONE);
     let smooths = |run: &FaceRun| run.faces > 0 && run.smoothing != Smoothing::Unspecified;
     let mut builder = VertexBuilder {

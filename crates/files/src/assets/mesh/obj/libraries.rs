@@ -68,7 +68,7 @@ impl MtlLibraryLoader<'_> {
         let hash = library.as_ref().ok().map(|library| library.hash);
         self.found.files.push(Companion { path: path.to_owned(), hash, stamp });
         match library {
-            Ok(library) => Ok(self.add_materials_and_map_used(path, library)),
+            Ok(library) => Ok(self.add_materials_and_map_names(path, library)),
             Err(error @ AssetError::Unreadable { .. }) => {
                 self.found.missing = true;
                 self.found.warnings.push(unreadable_library_warning(&error));
@@ -78,7 +78,7 @@ impl MtlLibraryLoader<'_> {
         }
     }
 
-    fn add_materials_and_map_used(&mut self, path: &Path, library: MtlLibrary) -> HashMap<String, usize> {
+    fn add_materials_and_map_names(&mut self, path: &Path, library: MtlLibrary) -> HashMap<String, usize> {
         let MtlLibrary { materials, ignored, hash: _ } = library;
         let folder = path.parent().unwrap_or(Path::new(""));
         let indices =

@@ -16,7 +16,7 @@ use super::parsed::ParsedMesh;
 use super::text::convert_mac_line_ends;
 use super::{AssetError, LoadedMesh, MeshFileBytes};
 use crate::assets::FileMaterial;
-use build::{FaceRun, build_faces};
+use build::{FaceRun, build_vertices_and_faces};
 use libraries::{LoadedLibraries, MtlLibraryLoader};
 use missing_uvs::MissingUvs;
 pub(super) use references::referenced_files;
@@ -38,7 +38,7 @@ fn parse_normalized_text(source: &MeshFileBytes<'_>) -> Result<LoadedMesh, Asset
         warnings: std::mem::take(&mut statements.warnings),
         ..ParsedMesh::default()
     };
-    build_faces(&statements, &runs, &mut parsed);
+    build_vertices_and_faces(&statements, &runs, &mut parsed);
     let missing = MissingUvs::find(&statements, &runs, &parsed.materials);
     parsed.warnings.extend(missing.partial_uvs_warning(source));
     parsed.material_warnings.extend(missing.material_warnings(source, &parsed));

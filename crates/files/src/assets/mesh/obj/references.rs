@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use super::super::text::{Lines, convert_mac_line_ends};
+use super::super::text::{LineReader, convert_mac_line_ends};
 use super::super::{FILE_LIMIT, mtl};
 use super::libraries::resolve_library_paths;
 use super::words::ObjTextCursor;
@@ -16,7 +16,7 @@ pub(in crate::assets::mesh) fn referenced_files(
 ) -> Result<Vec<PathBuf>, Canceled> {
     let mut files = BTreeSet::new();
     for library in referenced_libraries(path, token)? {
-        if let Ok(mut lines) = Lines::open(&library, mtl::FILE_LIMIT) {
+        if let Ok(mut lines) = LineReader::open(&library, mtl::FILE_LIMIT) {
             while let Some(line) = lines.read_next_line(token)? {
                 files.extend(mtl::map_statement_image_candidates(&library, line));
             }
@@ -28,7 +28,7 @@ pub(in crate::assets::mesh) fn referenced_files(
 
 fn referenced_libraries(path: &Path, token: &CancelToken) -> Result<BTreeSet<PathBuf>, Canceled> {
     let mut libraries = BTreeSet::new();
-    let Ok(mut lines) = Lines::open(path, FILE_LIMIT) else { return Ok(libraries) };
+    let Ok(mut lines) = LineReader::open(path, FILE_LIMIT) else { return Ok(libraries) };
     loop {
         // Most lines contain only numbers.
         lines.skip_buffered_lines_without_letter(b'm');
@@ -113,7 +113,7 @@ mod tests {
         let path = folder.path().join("mesh.obj");
         let text = format!("f {}\nmtllib a.mtl\n", "1 ".repeat(3 << 20));
         fs::write(&path, text).expect("written");
-        let mut lines = Lines::open(&path, FILE_LIMIT).expect("opened");
+        let mut lines = LineReader::open(&path, FILE_LIMIT).expect("opened");
         while let Some(line) = lines.read_next_line(&CancelToken::new()).expect("not canceled") {
             assert!(line.len() <= 1 << 20);
         }

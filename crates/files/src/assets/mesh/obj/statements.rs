@@ -40,7 +40,7 @@ pub(super) enum StateChange {
 const MAX_KEYWORD_LENGTH: usize = 6;
 
 /// Converts a keyword to lowercase. Words longer than any keyword are returned unchanged.
-fn lower_case<'a>(word: &'a [u8], lower: &'a mut [u8; MAX_KEYWORD_LENGTH]) -> &'a [u8] {
+fn keyword_to_lowercase<'a>(word: &'a [u8], lower: &'a mut [u8; MAX_KEYWORD_LENGTH]) -> &'a [u8] {
     let Some(lower) = lower.get_mut(..word.len()) else { return word };
     lower.copy_from_slice(word);
     lower.make_ascii_lowercase();
@@ -99,7 +99,7 @@ impl ParsedObj {
             return Ok(());
         };
         let mut lower = [0; MAX_KEYWORD_LENGTH];
-        match lower_case(keyword, &mut lower) {
+        match keyword_to_lowercase(keyword, &mut lower) {
             b"v" => self.vertices.parse_vertex(words)?,
             b"vt" => {
                 let [u, v, _] = parse_min_to_max_numbers(words, 1, 2, "texture coordinates")?;

@@ -78,7 +78,7 @@ impl Vertices {
         if !color.iter().all(|part| part.is_finite()) {
             return Err(NONFINITE_COLOR.to_owned());
         }
-        self.range.add(color, start);
+        self.range.add_color(color, start);
         self.colors.resize(self.positions.len(), None);
         self.colors.push(Some(color.map(|part| part as f32)));
         Ok(())

@@ -5,7 +5,7 @@
 
 use super::assemble::assemble_text_mesh;
 use super::parsed::{ColorRangeDetector, FACE_COLORS_IGNORED, ParsedMesh, alpha_ignored_warning};
-use super::text::{Cursor, expected_message, quote_word, unexpected_line_end_message};
+use super::text::{TextCursor, expected_message, quote_word, unexpected_line_end_message};
 use super::{AssetError, EMPTY_FILE, LoadedMesh, MeshFileBytes, vertex_out_of_range_message};
 use crate::math::{DVec2, DVec3, Vec2};
 
@@ -24,13 +24,13 @@ struct DeclaredVertexColumns {
 
 pub(super) fn parse(source: &MeshFileBytes<'_>) -> Result<LoadedMesh, AssetError> {
     let (excess, indices) = Default::default();
-    OffReader { source: *source, cursor: Cursor::new(source.bytes, 0), excess, indices }.read()
+    OffReader { source: *source, cursor: TextCursor::new(source.bytes, 0), excess, indices }.read()
 }
 
 #[derive(Clone, Copy)]
 struct OffReader<'a> {
     source: MeshFileBytes<'a>,
-    cursor: Cursor<'a>,
+    cursor: TextCursor<'a>,
     /// Lines with numbers that the header does not declare.
     excess: LinesToWarnAbout,
     /// Lines whose color is an index into a colormap.
@@ -128,7 +128,7 @@ impl ParsedOffColors {
     /// Adds the same color for `times` vertices or corners.
     fn push_repeated(&mut self, color: &[f64], times: usize, at: usize) {
         let color: Option<[f64; 3]> = color.first_chunk().copied();
-        color.iter().for_each(|color| self.range.add(*color, at));
+        color.iter().for_each(|color| self.range.add_color(*color, at));
         self.all.extend(std::iter::repeat_n(color, times));
     }
 
@@ -140,7 +140,11 @@ impl ParsedOffColors {
 
     /// Returns the colors as bytes, with white for missing colors, or an empty list if all are missing. Adds
     /// warnings about alpha and out-of-range colors.
-    fn finish(self, source: &MeshFileBytes<'_>, warnings: &mut Vec<String>) -> Vec<[u8; 3]> {
+    fn into_bytes_adding_warnings(
+        self,
+        source: &MeshFileBytes<'_>,
+        warnings: &mut Vec<String>,
+    ) -> Vec<[u8; 3]> {
         if self.all.iter().all(Option::is_none) {
             return Vec::new();
         }
@@ -166,7 +170,7 @@ impl OffReader<'_> {
         self.read_vertices(header, vertices, &mut parsed)?;
         let before_faces = self;
         let colors = self.read_faces(vertices, faces, &mut parsed)?;
-        let face_colors = colors.finish(&self.source, &mut parsed.warnings);
+        let face_colors = colors.into_bytes_adding_warnings(&self.source, &mut parsed.warnings);
         if parsed.colors.is_empty() {
             parsed.corner_colors = face_colors;
         } else if !face_colors.is_empty() {
@@ -214,7 +218,7 @@ impl OffReader<'_> {
         if !known || !digits.iter().all(u8::is_ascii_digit) {
             return self.fail(unsupported_variant_message(word));
         }
-        self.cursor = Cursor::new(self.source.bytes, self.cursor.offset() - digits.len());
+        self.cursor = TextCursor::new(self.source.bytes, self.cursor.offset() - digits.len());
         self.reject_binary()?;
         let has = |letter| flags.contains(&letter);
         Ok(DeclaredVertexColumns {
@@ -316,7 +320,7 @@ impl OffReader<'_> {
             }
             self.cursor.move_to_next_line();
         }
-        parsed.colors = colors.finish(&self.source, &mut parsed.warnings);
+        parsed.colors = colors.into_bytes_adding_warnings(&self.source, &mut parsed.warnings);
         Ok(())
     }
 

@@ -1,6 +1,6 @@
 //! Reads the numbers after a PLY header, as text or as binary data in either byte order.
 
-use super::super::text::{Cursor, expected_message};
+use super::super::text::{TextCursor, expected_message};
 use super::header::ScalarType;
 
 /// Reads numbers in file order. Errors do not include the position in the file.
@@ -29,7 +29,7 @@ pub(super) const END_OF_FILE: &str = "unexpected end of file";
 
 /// Numbers separated by whitespace.
 #[derive(Clone)]
-pub(super) struct AsciiReader<'a>(pub(super) Cursor<'a>, pub(super) LineEndMode);
+pub(super) struct AsciiReader<'a>(pub(super) TextCursor<'a>, pub(super) LineEndMode);
 
 /// How line ends in text files are interpreted.
 #[derive(Clone, Copy)]

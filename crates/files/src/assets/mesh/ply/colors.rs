@@ -29,7 +29,7 @@ impl PlyColorCollector {
     pub(super) fn push(&mut self, color: [f64; 3], at: usize) {
         self.extremes.iter_mut().zip(color).for_each(|(extremes, part)| extremes.add_component(part, at));
         if !self.are_bytes() {
-            self.range.add(color, at);
+            self.range.add_color(color, at);
         }
         self.push_untracked(color);
     }
@@ -59,7 +59,7 @@ impl PlyColorCollector {
 
     /// Returns the colors as bytes, and warnings about ignored alpha and out-of-range values. Each warning
     /// has a byte offset in an affected item.
-    pub(super) fn finish(self) -> (Vec<[u8; 3]>, Vec<(usize, String)>) {
+    pub(super) fn into_bytes_and_warnings(self) -> (Vec<[u8; 3]>, Vec<(usize, String)>) {
         let max = self.extremes.iter().map(ColorComponentExtremes::max).fold(0.0, f64::max);
         let one = |scalar: ScalarType| match scalar {
             ScalarType::U8 | ScalarType::I8 => scalar.full_intensity(),

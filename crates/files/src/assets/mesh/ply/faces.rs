@@ -5,7 +5,7 @@ use super::body::NumberReader;
 use super::colors::PlyColorCollector;
 use super::header::{Element, PropertyType, ScalarType};
 use super::{
-    ErrorContext, checked_vertex_index, read_items, read_list_length, skip_property, vertex_property_slot,
+    ErrorContext, checked_vertex_index, for_each_item, read_list_length, skip_property, vertex_property_slot,
 };
 use crate::assets::AssetError;
 use crate::math::DVec2;
@@ -72,7 +72,7 @@ pub(super) fn read_with_attributes(
 ) -> Result<(), AssetError> {
     let roles = property_roles(element, corners);
     let mut faces = FaceReader::new(&roles);
-    read_items(context, element, numbers, |numbers| {
+    for_each_item(context, element, numbers, |numbers| {
         let start = numbers.offset();
         faces.read_face(&roles, numbers, vertices)?;
         faces.append_face_to_mesh(parsed, start, numbers.offset());
@@ -230,7 +230,7 @@ impl FaceReader {
         }
         let Some(colors) = self.colors else { return };
         if parsed.colors.is_empty() {
-            let (colors, warnings) = colors.finish();
+            let (colors, warnings) = colors.into_bytes_and_warnings();
             parsed.corner_colors = colors;
             parsed.warnings.extend(context.add_line_numbers_to_warnings(warnings));
         } else {

@@ -10,7 +10,7 @@ pub mod write;
 
 use super::assemble::assemble_text_mesh;
 use super::parsed::ParsedMesh;
-use super::text::Cursor;
+use super::text::TextCursor;
 use super::{AssetError, LoadedMesh, MeshFileBytes, vertex_out_of_range_message};
 use crate::math::{DVec2, DVec3};
 use body::{AsciiReader, BinaryReader, LineEndMode, NumberReader};
@@ -26,23 +26,23 @@ pub(super) fn parse(source: &MeshFileBytes<'_>) -> Result<LoadedMesh, AssetError
     let (bytes, at) = (source.bytes, header.body);
     match header.encoding {
         Encoding::Ascii => read_text_bytes(source, &header),
-        Encoding::LittleEndian => read(source, &header, &mut BinaryReader::<false> { bytes, at }),
-        Encoding::BigEndian => read(source, &header, &mut BinaryReader::<true> { bytes, at }),
+        Encoding::LittleEndian => read_body(source, &header, &mut BinaryReader::<false> { bytes, at }),
+        Encoding::BigEndian => read_body(source, &header, &mut BinaryReader::<true> { bytes, at }),
     }
 }
 
 /// Reads a text file, ignoring line ends. If this fails or leaves words unread, some lines may contain
 /// undeclared values, so the file is read again with one item per line.
 fn read_text_bytes(source: &MeshFileBytes<'_>, header: &PlyHeader) -> Result<LoadedMesh, AssetError> {
-    let cursor = Cursor::new(source.bytes, header.body);
+    let cursor = TextCursor::new(source.bytes, header.body);
     let mut words = AsciiReader(cursor, LineEndMode::Blank);
-    let by_words = read(source, header, &mut words);
+    let by_words = read_body(source, header, &mut words);
     source.monitor.token.check_pause_and_cancel()?;
     if by_words.is_ok() && !words.0.skip_to_word_across_lines() {
         return by_words;
     }
     let mut lines = AsciiReader(cursor, LineEndMode::EndItems(0, None));
-    let by_lines = read(source, header, &mut lines);
+    let by_lines = read_body(source, header, &mut lines);
     match (by_lines, lines.1) {
         (Ok(mut loaded), LineEndMode::EndItems(count, Some(first))) => {
             let line = source.line_number(first);
@@ -91,7 +91,7 @@ impl ErrorContext<'_> {
     }
 }
 
-fn read(
+fn read_body(
     source: &MeshFileBytes<'_>,
     header: &PlyHeader,
     numbers: &mut impl NumberReader,
@@ -114,7 +114,7 @@ fn read(
     };
     let mut before_faces = None;
     for element in &header.elements {
-        check_plausible_counts(source, element, header.encoding, numbers.offset())?;
+        check_plausible_count(source, element, header.encoding, numbers.offset())?;
         match element.name.as_str() {
             "vertex" => read_vertices(&context, element, numbers, &mut parsed)?,
             "face" => {
@@ -123,7 +123,7 @@ fn read(
             }
             "tristrips" if !has_faces => read_strips(&context, element, numbers, vertices, &mut parsed)?,
             _ if element.properties.is_empty() => {}
-            _ => read_items(&context, element, numbers, |numbers| {
+            _ => for_each_item(&context, element, numbers, |numbers| {
                 element.properties.iter().try_for_each(|property| skip_property(numbers, property.kind))
             })?,
         }
@@ -138,7 +138,7 @@ fn read(
 }
 
 /// Rejects element counts that are too large for the file size, before any memory is allocated.
-fn check_plausible_counts(
+fn check_plausible_count(
     source: &MeshFileBytes<'_>,
     element: &Element,
     encoding: Encoding,
@@ -188,7 +188,7 @@ fn missing_vertex_indices_message(element: &str) -> String {
 }
 
 /// Reads all items of an element.
-fn read_items<N: NumberReader>(
+fn for_each_item<N: NumberReader>(
     context: &ErrorContext<'_>,
     element: &Element,
     numbers: &mut N,
@@ -287,7 +287,7 @@ fn read_vertices(
     parsed.normals.reserve(if has_normals { count } else { 0 });
     parsed.uvs.reserve(if has_uvs { count } else { 0 });
     parsed.second_uvs.reserve(if has_second_uvs { count } else { 0 });
-    read_items(context, element, numbers, |numbers| {
+    for_each_item(context, element, numbers, |numbers| {
         let mut values = [0.0; 14];
         for &(kind, slot) in &layout {
             match (kind, slot) {
@@ -317,7 +317,7 @@ fn read_vertices(
         Ok(())
     })?;
     if let Some(colors) = colors {
-        let (colors, warnings) = colors.finish();
+        let (colors, warnings) = colors.into_bytes_and_warnings();
         parsed.colors = colors;
         parsed.warnings.extend(context.add_line_numbers_to_warnings(warnings));
     }
@@ -341,7 +341,7 @@ fn read_faces(
     }
     let faces = &mut parsed.faces;
     faces.reserve(element.count as usize);
-    read_items_with_list_property(context, element, corners, numbers, |numbers, item, length| {
+    read_list_of_each_item(context, element, corners, numbers, |numbers, item, length| {
         for _ in 0..length {
             faces.push_corner(checked_vertex_index(numbers.read_integer(item)?, vertices)?);
         }
@@ -365,7 +365,7 @@ fn read_strips(
             .malformed_error_without_line(missing_vertex_indices_message(&element.name)));
     };
     let faces = &mut parsed.faces;
-    read_items_with_list_property(context, element, corners, numbers, |numbers, item, length| {
+    read_list_of_each_item(context, element, corners, numbers, |numbers, item, length| {
         let (mut before, mut count) = ([0; 2], 0_usize);
         for _ in 0..length {
             let vertex = numbers.read_integer(item)?;
@@ -404,14 +404,14 @@ fn checked_vertex_index(vertex: i64, vertices: u64) -> Result<u32, String> {
 
 /// Reads all items of an element. Calls `read` for the property with index `corners`, with the item type and
 /// length of its list, and skips the other properties.
-fn read_items_with_list_property<N: NumberReader>(
+fn read_list_of_each_item<N: NumberReader>(
     context: &ErrorContext<'_>,
     element: &Element,
     corners: usize,
     numbers: &mut N,
     mut read: impl FnMut(&mut N, ScalarType, usize) -> Result<(), String>,
 ) -> Result<(), AssetError> {
-    read_items(context, element, numbers, |numbers| {
+    for_each_item(context, element, numbers, |numbers| {
         for (index, property) in element.properties.iter().enumerate() {
             let PropertyType::List { count, item } = property.kind else {
                 skip_property(numbers, property.kind)?;

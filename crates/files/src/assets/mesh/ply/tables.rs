@@ -5,7 +5,7 @@ use std::path::Path;
 use super::super::{AssetError, MeshFileBytes, Monitor};
 use super::body::{AsciiReader, BinaryReader, END_OF_FILE, LineEndMode, NumberReader};
 use super::header::{self, Element, Encoding, PropertyType};
-use super::{BATCH, Cursor};
+use super::{BATCH, TextCursor};
 use crate::control::{CancelToken, ignore_progress};
 use crate::math::DVec3;
 
@@ -68,7 +68,7 @@ pub fn read_tables(path: &Path, bytes: &[u8], token: &CancelToken) -> Result<Ply
     let (elements, at) = (&header.elements, header.body);
     let read = match header.encoding {
         Encoding::Ascii => {
-            let cursor = Cursor::new(bytes, at);
+            let cursor = TextCursor::new(bytes, at);
             read_elements(elements, &mut AsciiReader(cursor, LineEndMode::Blank), token)
         }
         Encoding::LittleEndian => read_elements(elements, &mut BinaryReader::<false> { bytes, at }, token),

@@ -74,7 +74,7 @@ impl CornerTree {
 
     /// Searches the nodes that overlap the triangle, and returns a corner that `is_wanted` accepts. Passes
     /// removed corners to `is_wanted` as well. Adds the number of visited nodes and corners to `visits`.
-    pub(super) fn find_corner_near_triangle(
+    pub(super) fn search_near_triangle(
         &self,
         triangle: [DVec2; 3],
         visits: &mut u64,

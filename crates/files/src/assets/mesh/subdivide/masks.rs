@@ -36,12 +36,12 @@ fn wide_fan_edge_weight(faces: u32) -> f64 {
 /// middle of an edge.
 pub(super) fn refined_value<T: VertexValue>(topology: &Topology, values: &[T], index: usize) -> T {
     match index.checked_sub(topology.vertex_count()) {
-        None => refined_vertex(topology, values, index as u32),
+        None => refined_vertex_value(topology, values, index as u32),
         Some(edge) => refined_edge_value(topology, values, topology.edge_halves[edge]),
     }
 }
 
-fn refined_vertex<T: VertexValue>(topology: &Topology, values: &[T], vertex: u32) -> T {
+fn refined_vertex_value<T: VertexValue>(topology: &Topology, values: &[T], vertex: u32) -> T {
     let value = values[vertex as usize];
     if topology.is_corner(vertex) {
         return value;

@@ -64,7 +64,7 @@ pub fn subdivide(
         return Ok(loaded);
     }
     check_triangle_count(loaded.mesh.triangles.len(), levels, path)?;
-    let work = ParallelListBuilder { path, token };
+    let work = ParallelMapper { path, token };
     let before = loaded.mesh.triangles.len();
     let control = ControlMesh::weld(&mut loaded.mesh, work)?;
     loaded.dropped.degenerate += (before - loaded.mesh.triangles.len()) as u64;
@@ -72,7 +72,7 @@ pub fn subdivide(
     loaded.warnings.extend(improper_edges_warning(control.improper_edges));
     let TriangleMesh { origin, materials, .. } = std::mem::take(&mut loaded.mesh);
     let copies = 1 << (2 * levels);
-    let materials = work.build(materials.len() * copies, |triangle| materials[triangle / copies])?;
+    let materials = work.map_indices(materials.len() * copies, |triangle| materials[triangle / copies])?;
     loaded.mesh = TriangleMesh { origin, materials, ..subdivided_mesh(control, levels, work)? };
     loaded.dropped.degenerate += drop_triangles_without_area(&mut loaded.mesh);
     check_has_triangles(&loaded.mesh, path)?;
@@ -123,7 +123,7 @@ fn improper_edges_warning(count: usize) -> Option<String> {
 fn subdivided_mesh(
     control: ControlMesh,
     levels: u32,
-    work: ParallelListBuilder<'_>,
+    work: ParallelMapper<'_>,
 ) -> Result<TriangleMesh, AssetError> {
     let ControlMesh { mut shape, mut points, mut seamed, mut uvs, mut second_uvs, mut colors, .. } = control;
     for level in 1..=levels {
@@ -139,12 +139,12 @@ fn subdivided_mesh(
     }
     let attributes = seamed.as_ref().unwrap_or(&shape);
     let uv = |uv: DVec2| uv.as_vec2();
-    let uvs: Vec<Vec2> = limit_values(attributes, &uvs, uv, work)?;
-    let second_uvs: Vec<Vec2> = limit_values(attributes, &second_uvs, uv, work)?;
+    let uvs: Vec<Vec2> = converted_limit_values(attributes, &uvs, uv, work)?;
+    let second_uvs: Vec<Vec2> = converted_limit_values(attributes, &second_uvs, uv, work)?;
     let color = |color: DVec3| color.as_vec3().to_array().map(linear_to_srgb8);
-    let colors = limit_values(attributes, &colors, color, work)?;
+    let colors = converted_limit_values(attributes, &colors, color, work)?;
     let triangles = attributes.refined_triangles(work)?;
-    let (positions, normals) = limit_surface(&shape, &points, attributes, work)?;
+    let (positions, normals) = limit_positions_and_normals(&shape, &points, attributes, work)?;
     Ok(TriangleMesh { positions, normals, uvs, second_uvs, colors, triangles, ..TriangleMesh::default() })
 }
 
@@ -152,32 +152,32 @@ fn subdivided_mesh(
 fn refine_values<T: VertexValue>(
     topology: &Topology,
     values: &[T],
-    work: ParallelListBuilder<'_>,
+    work: ParallelMapper<'_>,
 ) -> Result<Vec<T>, AssetError> {
     if values.is_empty() {
         return Ok(Vec::new());
     }
-    work.build(topology.vertex_count() + topology.edge_count(), |index| {
+    work.map_indices(topology.vertex_count() + topology.edge_count(), |index| {
         refined_value(topology, values, index)
     })
 }
 
 /// Converted values on the limit surface, from the values after the last refinement. An empty list stays empty.
-fn limit_values<T: VertexValue, U: Send>(
+fn converted_limit_values<T: VertexValue, U: Send>(
     topology: &Topology,
     refined: &[T],
     convert: impl Fn(T) -> U + Sync,
-    work: ParallelListBuilder<'_>,
+    work: ParallelMapper<'_>,
 ) -> Result<Vec<U>, AssetError> {
-    work.build(refined.len(), |index| convert(limit_value(topology, refined, index)))
+    work.map_indices(refined.len(), |index| convert(limit_value(topology, refined, index)))
 }
 
 /// Positions and normals on the limit surface for each vertex of the attributes' connectivity.
-fn limit_surface(
+fn limit_positions_and_normals(
     shape: &Topology,
     points: &[DVec3],
     attributes: &Topology,
-    work: ParallelListBuilder<'_>,
+    work: ParallelMapper<'_>,
 ) -> Result<(Vec<Vec3>, Vec<Vec3>), AssetError> {
     let limit_normals = LimitNormalCalculator::new(shape, points);
     let place = |vertex: usize| match vertex.checked_sub(attributes.vertex_count()) {
@@ -185,7 +185,7 @@ fn limit_surface(
         Some(edge) => RefinedVertexLocation::Edge(attributes.edge_halves[edge]),
     };
     let count = attributes.vertex_count() + attributes.edge_count();
-    let positions = work.build(count, |vertex| {
+    let positions = work.map_indices(count, |vertex| {
         let index = match place(vertex) {
             RefinedVertexLocation::Vertex(half) => shape.start_vertex(half) as usize,
             RefinedVertexLocation::Edge(half) => {
@@ -194,7 +194,7 @@ fn limit_surface(
         };
         limit_value(shape, points, index).as_vec3()
     })?;
-    let normals = work.build_with_buffer(count, |vertex, arms| match place(vertex) {
+    let normals = work.map_indices_with_buffer(count, |vertex, arms| match place(vertex) {
         RefinedVertexLocation::Vertex(half) => limit_normals.normal_at_vertex(half, arms),
         RefinedVertexLocation::Edge(half) => limit_normals.normal_at_edge(half),
     })?;
@@ -227,20 +227,24 @@ fn drop_triangles_without_area(mesh: &mut TriangleMesh) -> u64 {
 
 /// Computes long lists in parallel, in batches between which it can be canceled.
 #[derive(Clone, Copy)]
-struct ParallelListBuilder<'a> {
+struct ParallelMapper<'a> {
     /// The mesh file, for error messages.
     path: &'a Path,
     token: &'a CancelToken,
 }
 
-impl ParallelListBuilder<'_> {
+impl ParallelMapper<'_> {
     /// Returns a list of `count` values.
-    fn build<T: Send>(self, count: usize, value: impl Fn(usize) -> T + Sync) -> Result<Vec<T>, AssetError> {
-        self.build_with_buffer(count, |index, _: &mut Vec<()>| value(index))
+    fn map_indices<T: Send>(
+        self,
+        count: usize,
+        value: impl Fn(usize) -> T + Sync,
+    ) -> Result<Vec<T>, AssetError> {
+        self.map_indices_with_buffer(count, |index, _: &mut Vec<()>| value(index))
     }
 
     /// Returns a list of `count` values, whose computation uses a buffer.
-    fn build_with_buffer<T: Send, B: Send>(
+    fn map_indices_with_buffer<T: Send, B: Send>(
         self,
         count: usize,
         value: impl Fn(usize, &mut Vec<B>) -> T + Sync,

@@ -3,7 +3,7 @@
 
 use rayon::prelude::*;
 
-use super::ParallelListBuilder;
+use super::ParallelMapper;
 use crate::assets::AssetError;
 
 /// Twin of half-edges at boundaries and creases.
@@ -51,7 +51,7 @@ pub(super) fn previous_half_edge(half: u32) -> u32 {
     if half.is_multiple_of(3) { half + 2 } else { half - 1 }
 }
 
-fn value_at_half_edge(of_faces: &[[u32; 3]], half: u32) -> u32 {
+fn half_edge_entry(of_faces: &[[u32; 3]], half: u32) -> u32 {
     of_faces[half as usize / 3][half as usize % 3]
 }
 
@@ -80,12 +80,12 @@ impl Topology {
     pub(super) fn connect(
         triangles: Vec<[u32; 3]>,
         vertices: usize,
-        work: ParallelListBuilder<'_>,
+        work: ParallelMapper<'_>,
     ) -> Result<(Self, usize), AssetError> {
-        let mut halves = work.build(3 * triangles.len(), |half| {
+        let mut halves = work.map_indices(3 * triangles.len(), |half| {
             let (start, end) = (
-                value_at_half_edge(&triangles, half as u32),
-                value_at_half_edge(&triangles, next_half_edge(half as u32)),
+                half_edge_entry(&triangles, half as u32),
+                half_edge_entry(&triangles, next_half_edge(half as u32)),
             );
             (u64::from(start.min(end)) << 32 | u64::from(start.max(end)), half as u32)
         })?;
@@ -138,7 +138,7 @@ impl Topology {
                 other.twins[face][corner] = twin;
             }
             other.edges[face][corner] = if is_joined && twin < half {
-                value_at_half_edge(&other.edges, twin) | REVERSED
+                half_edge_entry(&other.edges, twin) | REVERSED
             } else {
                 other.edge_halves.push(half);
                 other.edge_halves.len() as u32 - 1
@@ -161,7 +161,7 @@ impl Topology {
                 faces += 1;
             });
             fans.list.push(Fan { start, faces, last });
-            let known = &mut self.vertex_halves[value_at_half_edge(&self.triangles, half) as usize];
+            let known = &mut self.vertex_halves[half_edge_entry(&self.triangles, half) as usize];
             *known = if *known == NONE { start } else { *known };
         }
         fans
@@ -220,22 +220,22 @@ impl Topology {
 
     /// Start vertex of a half-edge.
     pub(super) fn start_vertex(&self, half: u32) -> u32 {
-        value_at_half_edge(&self.triangles, half)
+        half_edge_entry(&self.triangles, half)
     }
 
     /// End vertex of a half-edge.
     pub(super) fn end_vertex(&self, half: u32) -> u32 {
-        value_at_half_edge(&self.triangles, next_half_edge(half))
+        half_edge_entry(&self.triangles, next_half_edge(half))
     }
 
     /// Twin of a half-edge, or [`NONE`].
     pub(super) fn twin(&self, half: u32) -> u32 {
-        value_at_half_edge(&self.twins, half)
+        half_edge_entry(&self.twins, half)
     }
 
     /// Edge of a half-edge.
     pub(super) fn edge_of_half_edge(&self, half: u32) -> u32 {
-        value_at_half_edge(&self.edges, half) & !REVERSED
+        half_edge_entry(&self.edges, half) & !REVERSED
     }
 
     /// Whether a vertex stays in place.
@@ -289,12 +289,9 @@ impl Topology {
 
     /// Triangles after splitting each face into four: one at each corner, then the one in the middle. The
     /// index of the new vertex on an edge is the original vertex count plus the edge's index.
-    pub(super) fn refined_triangles(
-        &self,
-        work: ParallelListBuilder<'_>,
-    ) -> Result<Vec<[u32; 3]>, AssetError> {
+    pub(super) fn refined_triangles(&self, work: ParallelMapper<'_>) -> Result<Vec<[u32; 3]>, AssetError> {
         let first = self.vertex_count() as u32;
-        let split = work.build(self.triangles.len(), |face| {
+        let split = work.map_indices(self.triangles.len(), |face| {
             let [a, b, c] = self.triangles[face];
             let [ab, bc, ca] = self.edges[face].map(|edge| first + (edge & !REVERSED));
             [[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]]
@@ -304,26 +301,28 @@ impl Topology {
 
     /// Splits each face into four. See [`Topology::refined_triangles`]. The halves of edge e become the edges
     /// 2e and 2e + 1; the edges within faces follow.
-    pub(super) fn refined(self, work: ParallelListBuilder<'_>) -> Result<Self, AssetError> {
+    pub(super) fn refined(self, work: ParallelMapper<'_>) -> Result<Self, AssetError> {
         let triangles = self.refined_triangles(work)?;
         let (faces, first) = (self.triangles.len(), 2 * self.edge_count() as u32);
-        let twins = work.build(faces, |face| self.twins_of_children(face as u32))?.into_flattened();
-        let edges = work.build(faces, |face| self.edges_of_child_faces(face as u32, first))?.into_flattened();
+        let twins = work.map_indices(faces, |face| self.twins_of_children(face as u32))?.into_flattened();
+        let edges =
+            work.map_indices(faces, |face| self.edges_of_child_faces(face as u32, first))?.into_flattened();
         let edge_halves =
-            work.build(first as usize + 3 * faces, |edge| match (edge as u32).checked_sub(first) {
+            work.map_indices(first as usize + 3 * faces, |edge| match (edge as u32).checked_sub(first) {
                 Some(inner) => 3 * child_face(inner / 3, inner % 3) + 1,
                 None => {
                     let half = self.edge_halves[edge / 2];
                     let is_at_start =
-                        edge as u32 % 2 == u32::from(value_at_half_edge(&self.edges, half) & REVERSED != 0);
+                        edge as u32 % 2 == u32::from(half_edge_entry(&self.edges, half) & REVERSED != 0);
                     if is_at_start { outgoing_child(half) } else { incoming_child(half) }
                 }
             })?;
-        let vertex_halves = work.build(self.vertex_count() + self.edge_count(), |vertex| {
-            match self.vertex_halves.get(vertex) {
-                Some(half) => outgoing_child(*half),
-                None => incoming_child(self.edge_halves[vertex - self.vertex_count()]),
-            }
+        let vertex_halves = work.map_indices(self.vertex_count() + self.edge_count(), |vertex| match self
+            .vertex_halves
+            .get(vertex)
+        {
+            Some(half) => outgoing_child(*half),
+            None => incoming_child(self.edge_halves[vertex - self.vertex_count()]),
         })?;
         let Self { corners, wide, .. } = self;
         Ok(Self { triangles, twins, edges, edge_halves, vertex_halves, corners, wide })

@@ -1,7 +1,7 @@
 //! Converts a triangle mesh to control points, which determine the shape, and corner attributes such as
 //! texture coordinates.
 
-use super::ParallelListBuilder;
+use super::ParallelMapper;
 use super::topology::{Fans, NONE, Topology};
 use crate::assets::AssetError;
 use crate::assets::mesh::coincident::find_coincident_vertex_sets;
@@ -34,7 +34,7 @@ pub(super) struct ControlMesh {
 impl ControlMesh {
     /// Welds the vertices of a mesh that coincide. Drops triangles with coincident corners and vertices without
     /// triangles.
-    pub(super) fn weld(mesh: &mut TriangleMesh, work: ParallelListBuilder<'_>) -> Result<Self, AssetError> {
+    pub(super) fn weld(mesh: &mut TriangleMesh, work: ParallelMapper<'_>) -> Result<Self, AssetError> {
         let (triangles, sources) = weld_triangles(mesh, work)?;
         let points: Vec<DVec3> =
             sources.iter().map(|vertex| mesh.positions[*vertex as usize].as_dvec3()).collect();
@@ -42,7 +42,7 @@ impl ControlMesh {
         let fans = shape.find_fans();
         shape.classify_vertices(&fans, |_| false);
         work.token.check_pause_and_cancel()?;
-        let (corners, sources) = split_vertices_by_attributes(mesh, &fans, &shape);
+        let (corners, sources) = split_fans_by_uv_and_color(mesh, &fans, &shape);
         let is_same = sources.len() == points.len() && improper_edges == 0;
         let seamed = (!is_same).then(|| seamed_topology(&shape, corners, sources.len()));
         let uvs = |all: &[Vec2]| gather_and_convert(all, &sources, |uv: Vec2| uv.as_dvec2());
@@ -73,7 +73,7 @@ fn gather_and_convert<T: Copy, U>(values: &[T], vertices: &[u32], convert: impl 
 /// with coincident corners from the mesh.
 fn weld_triangles(
     mesh: &mut TriangleMesh,
-    work: ParallelListBuilder<'_>,
+    work: ParallelMapper<'_>,
 ) -> Result<(Vec<[u32; 3]>, Vec<u32>), AssetError> {
     let mut first: Vec<u32> = (0..mesh.positions.len() as u32).collect();
     for set in find_coincident_vertex_sets(&mesh.positions, work.token)? {
@@ -105,7 +105,7 @@ fn weld_triangles(
 
 /// Returns triangles whose corners share a vertex if they are in the same fan and have the same attributes,
 /// and one of the mesh's vertices for each.
-fn split_vertices_by_attributes(
+fn split_fans_by_uv_and_color(
     mesh: &TriangleMesh,
     fans: &Fans,
     shape: &Topology,
