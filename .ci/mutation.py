@@ -416,7 +416,7 @@ FAULTS = [
      "0.7 * view.diffuse_transmission_probability", PRINCIPLED + "diffuse_transmission_samples_follow_the_pdf"),
     ("η and k swapped", "materials/bxdfs/conductor/mod.rs", "let exact = ⟦fresnel_conductor(cosine, first, second)⟧;", "fresnel_conductor(cosine, second, first)",
      METAL + "element_reflectances_match_reference_values"),
-    ("a coat's η inverted", "materials/coat.rs", "dielectric_from_outside(cosine, ⟦self.ior⟧)", "1.0 / self.ior",
+    ("a coat's η inverted", "materials/coat.rs", "fresnel_dielectric_from_outside(cosine, ⟦self.ior⟧)", "1.0 / self.ior",
      PLASTIC + "values_match_the_formulas_and_are_reciprocal"),
     ("a coat that attenuates light only once", "materials/bxdfs/plastic/bxdf.rs", "if cosine > 0.0 { ⟦view.transmittance * entering⟧ } else", "view.transmittance",
      PLASTIC + "white_furnace_and_albedos_match_quadrature"),

@@ -51,9 +51,10 @@ fn run_terminal_ui(request: RenderRequest, console: &Console) -> Result<Exit, (E
     let watcher = Watcher::start(request.poll, Arc::clone(&contents), move |change| changes.send(change))
         .map_err(no_thread)?;
     let writes = SharedWriteLog::default();
-    let listener = WorkerEventForwarder { watcher, writes: writes.clone(), ui: events.worker_sender() };
-    let worker = start_worker(request.nice, Arc::clone(&contents), move |event| listener.handle_event(event))
-        .map_err(no_thread)?;
+    let forwarder = WorkerEventForwarder { watcher, writes: writes.clone(), ui: events.worker_sender() };
+    let worker =
+        start_worker(request.nice, Arc::clone(&contents), move |event| forwarder.handle_event(event))
+            .map_err(no_thread)?;
     let (remote, asked) = (worker.command_sender(), writes.clone());
     let options = TuiOptions {
         scene: request.scene,

@@ -1,9 +1,9 @@
 //! The render pipeline: from scene files to previews and images.
 //!
-//! [`start_worker`] starts a worker thread and returns a [`WorkerHandle`], which accepts commands. The worker owns a session
-//! (`session`), which runs the steps of each request: it prepares the scene (`prepare`), renders its film
-//! (`render`) and writes the image. [`headless`] renders without a worker. [`watch`] reports files whose content
-//! has changed.
+//! [`start_worker`] starts a worker thread and returns a [`WorkerHandle`], which accepts commands. The worker
+//! owns a session (`session`), which runs the steps of each request: it prepares the scene (`prepare`),
+//! renders its film (`render`) and writes the image. [`headless`] renders without a worker. [`watch`] reports
+//! files whose content has changed.
 //!
 //! `stages` contains one file per stage. Stages are functions of their inputs. Each stage compares a
 //! [fingerprint](crate::scene::fingerprint) of its inputs (`keys`) with the fingerprint of its cached value

@@ -68,8 +68,8 @@ pub struct Request {
     pub preview: Option<PreviewBounds>,
     /// Whether to write the finished image.
     pub write: WriteRequirement,
-    /// If this request shows another image than the scene's own, the overrides for the scene's own image, whose
-    /// film and checkpoint are kept. `None` if this request is for the scene's own image.
+    /// If this request shows another image than the scene's own, the overrides for the scene's own image,
+    /// whose film and checkpoint are kept. `None` if this request is for the scene's own image.
     pub own: Option<Box<Overrides>>,
     /// Number of times the scene's files have been saved. An image with keyboard changes that was written by
     /// [`Command::Write`] is kept until a request with a different number reads a valid scene.
@@ -435,7 +435,7 @@ pub struct RenderProgress {
     pub noise: Option<NoiseAndTimeToNextLevel>,
 }
 
-/// Current and predicted noise.
+/// The current noise, and when the next lower level will be reached.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NoiseAndTimeToNextLevel {
     /// Most recently measured [`Film::relative_error`](crate::film::Film::relative_error).

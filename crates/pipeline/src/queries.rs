@@ -249,7 +249,7 @@ fn save_model_scene_with_camera(
         return Err(format!("{shown} {ALREADY_EXISTS}: move it away and press c again"));
     }
     let text = loaded.text_with_camera(camera)?;
-    write::create_new(&path, text.as_bytes())
+    write::write_new_file(&path, text.as_bytes())
         .map_err(|error| format!("cannot write {shown}: {}", describe_io_error(&error)))?;
     Ok(CameraSaveResult { path, is_new: true, is_own: false, of_model: true, edit: None })
 }

@@ -60,7 +60,7 @@ pub(super) fn output_conflicts(plan: &RenderPlan, inputs: &ProtectedInputs) -> V
     let inputs = inputs.build_identity_index();
     // Later frames have distinct files, because each name contains the frame number.
     let mut first = HashMap::new();
-    for target in current_targets(plan) {
+    for target in output_files_of_request(plan) {
         if let Some(identity) = FileIdentity::from_existing_or_new_path(target.path) {
             first.entry(identity).or_insert(target);
         }
@@ -112,7 +112,7 @@ pub(super) fn write_guarded<'a, T>(
             if real == target.path {
                 return None;
             }
-            let mut others = current_targets(plan).filter(|other| *other != target);
+            let mut others = output_files_of_request(plan).filter(|other| *other != target);
             others.find(|other| FileIdentity::from_existing_or_new_path(other.path).as_ref() == Some(at))
         };
         match write_conflict(plan, target, real, &inputs, twin) {
@@ -139,11 +139,11 @@ fn format_conflict_line(conflict: &Diagnostic) -> String {
 /// Returns the files of this request, then the files of later turntable frames.
 fn targets_of_all_frames(plan: &RenderPlan) -> impl Iterator<Item = OutputTarget<'_>> {
     let picture = |path| OutputTarget::from_image_path(plan, path);
-    current_targets(plan).chain(plan.outputs.later_images.iter().map(PathBuf::as_path).map(picture))
+    output_files_of_request(plan).chain(plan.outputs.later_images.iter().map(PathBuf::as_path).map(picture))
 }
 
 /// Returns the files of this request: the images, then the report.
-fn current_targets(plan: &RenderPlan) -> impl Iterator<Item = OutputTarget<'_>> {
+fn output_files_of_request(plan: &RenderPlan) -> impl Iterator<Item = OutputTarget<'_>> {
     let picture = |path| OutputTarget::from_image_path(plan, path);
     let OutputFiles { images, animations, report, .. } = &plan.outputs;
     let report = report.iter().map(|path| OutputTarget::from_report_path(path));

@@ -22,8 +22,8 @@ use mailbox::Task;
 /// Starts a worker thread. On Linux, its render threads have the current thread's niceness plus `nice`, so
 /// that the front end and other programs have priority. A watcher of the same files can share `contents`.
 ///
-/// The worker passes its events to `listener`, from any of its threads. `listener` must neither block nor send
-/// commands.
+/// The worker passes its events to `listener`, from any of its threads. `listener` must neither block nor
+/// send commands.
 ///
 /// # Errors
 /// The system cannot start a thread.

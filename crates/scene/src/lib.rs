@@ -2,8 +2,8 @@
 //!
 //! [`load`] checks a file's size and type and reads it. [`parse`] converts its text to a
 //! [`description::Scene`] and a list of [`diagnostic::Diagnostic`]s. [`report`] formats diagnostics for the
-//! terminal. Importers of foreign formats build a [`SceneDocumentBuilder`] instead of a text, and [`load_built`]
-//! validates it in the same way.
+//! terminal. Importers of foreign formats build a [`SceneDocumentBuilder`] instead of a text, and
+//! [`load_built`] validates it in the same way.
 
 mod changes;
 pub mod description;

@@ -52,8 +52,8 @@ pub(super) fn binary_file_error(path: &Path) -> Box<Diagnostic> {
     )
 }
 
-/// Whether the first bytes of a file contain the `[camera]` header of a scene file. Comments in the formats of
-/// other renderers may mention it.
+/// Whether the first bytes of a file contain the `[camera]` header of a scene file. Comments in the formats
+/// of other renderers may mention it.
 fn has_camera_header(path: &Path, start: &[u8]) -> bool {
     const HEADER: &[u8] = b"[camera]";
     let extension = path.extension().unwrap_or_default().to_ascii_lowercase();

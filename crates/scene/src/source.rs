@@ -92,8 +92,8 @@ impl SceneText {
         span.start > self.file
     }
 
-    /// Whether a span refers to text. In a scene from a foreign file, values without a span have an empty span
-    /// at the start.
+    /// Whether a span refers to text. In a scene from a foreign file, values without a span have an empty
+    /// span at the start.
     pub(super) fn span_refers_to_text(&self, span: &Range<usize>) -> bool {
         !self.is_foreign || *span != (0..0)
     }

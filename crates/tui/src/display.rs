@@ -282,7 +282,7 @@ impl Display {
 
     /// Records that the operating system has accepted bytes.
     pub(super) fn record_accepted_bytes(&mut self, bytes: usize) {
-        self.connection.record_written_bytes(bytes);
+        self.connection.record_accepted_bytes(bytes);
     }
 
     /// Whether the target has been sent completely.

@@ -29,8 +29,8 @@ use crate::pipeline::protocol::{self, Command};
 const MAX_PLANNING_TIME: Duration = Duration::from_millis(3);
 
 /// Runs the front end until a key or signal ends it, then restores the terminal and sends [`Command::Quit`]
-/// to the worker. `queue` receives the events of the worker and the file watcher. Must not be called more than
-/// once per process.
+/// to the worker. `queue` receives the events of the worker and the file watcher. Must not be called more
+/// than once per process.
 ///
 /// # Errors
 /// Returns a [`TuiError`] if there is no terminal, if writing to it fails, or if the worker has ended.
@@ -44,7 +44,7 @@ pub fn run(options: TuiOptions, queue: EventQueue) -> Result<TuiOutcome, TuiErro
     let listener = SignalListener::start(&sender).map_err(io_error_to_tui_error("handle signals for"))?;
     let variable = |name: &str| std::env::var(name).ok();
     let capabilities =
-        TerminalId::from_environment(variable).map(TerminalId::desktop_integration).unwrap_or_default();
+        TerminalId::from_environment(variable).map(TerminalId::terminal_extras).unwrap_or_default();
     if capabilities.focus {
         terminal::enable_focus_reports_on_setup();
     }

@@ -123,7 +123,7 @@ pub(super) fn restore_saved_terminal_modes() {
 /// The terminal, opened during setup, so that restoring it does not need another file descriptor.
 static OUTPUT: Mutex<Option<File>> = Mutex::new(None);
 
-fn take_terminal_output() -> Option<File> {
+fn take_output_kept_for_restoring() -> Option<File> {
     OUTPUT.lock().unwrap_or_else(PoisonError::into_inner).take()
 }
 
@@ -160,7 +160,7 @@ fn leave_screen() {
     // Nothing else is writing, so dropping the system's buffered output makes room.
     let is_late = || Instant::now() >= deadline && (dropped.replace(true) || drop_kept().is_err());
     let _ = write_restore(&mut bytes)
-        .and_then(|()| take_terminal_output().map_or_else(writer::open_terminal_output, Ok))
+        .and_then(|()| take_output_kept_for_restoring().map_or_else(writer::open_terminal_output, Ok))
         .and_then(|mut out| writer::write_all_unless_canceled(&mut out, &bytes, is_late));
 }
 
@@ -174,7 +174,7 @@ pub(super) fn restore_from_other_thread() {
         writer::discard_queued_and_wait(Duration::ZERO);
         thread::spawn(|| {
             let tty = File::options().write(true).open("/dev/tty");
-            tty.or_else(|error| take_terminal_output().ok_or(error))
+            tty.or_else(|error| take_output_kept_for_restoring().ok_or(error))
                 .and_then(|mut tty| write_restore(&mut tty))
         });
     }

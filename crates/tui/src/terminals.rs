@@ -174,7 +174,7 @@ impl TerminalId {
     }
 
     /// Capabilities according to the terminal's documentation.
-    pub(super) fn desktop_integration(self) -> TerminalExtras {
+    pub(super) fn terminal_extras(self) -> TerminalExtras {
         let Self { brand, version } = self;
         let all = TerminalExtras {
             title: true,
@@ -311,7 +311,7 @@ mod tests {
             ("XTerm(390)", false),
         ] {
             let terminal = TerminalId::from_report(report).expect(report);
-            assert_eq!(terminal.desktop_integration().progress, has_progress, "{report}");
+            assert_eq!(terminal.terminal_extras().progress, has_progress, "{report}");
         }
     }
 }

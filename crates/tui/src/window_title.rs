@@ -139,7 +139,7 @@ mod tests {
     fn ui() -> TestUi {
         let mut ui = TestUi::new();
         ui.state.display.capabilities =
-            TerminalId { brand: TerminalBrand::Ghostty, version: [1, 2] }.desktop_integration();
+            TerminalId { brand: TerminalBrand::Ghostty, version: [1, 2] }.terminal_extras();
         ui
     }
 

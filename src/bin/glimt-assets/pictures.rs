@@ -37,7 +37,7 @@ fn quantized_noise(u: f64, v: f64, seed: u64) -> f64 {
 }
 
 /// Index of the brick at (u, v), and a measure of distance from the mortar (0 in the joint, 1 on the brick).
-fn brick_index_and_joint_distance(u: f64, v: f64) -> ([i64; 2], f64) {
+fn brick_index_and_mask(u: f64, v: f64) -> ([i64; 2], f64) {
     let course = (v * COURSES).floor();
     let shift = if course % 2.0 == 0.0 { 0.0 } else { 0.5 };
     let along = (u * BRICKS + shift).rem_euclid(BRICKS);
@@ -51,7 +51,7 @@ fn brick_index_and_joint_distance(u: f64, v: f64) -> ([i64; 2], f64) {
 /// Red bricks in running bond.
 pub(crate) fn bricks() -> Vec<u8> {
     let pixels = render_srgb(SIDE, |u, v| {
-        let ([x, y], inside) = brick_index_and_joint_distance(u, v);
+        let ([x, y], inside) = brick_index_and_mask(u, v);
         let tint = lattice_random([x, y, 0], 17);
         let clay = mix([0.52, 0.21, 0.15], [0.72, 0.37, 0.25], tint);
         let clay = scale(clay, 0.82 + 0.3 * quantized_noise(u, v, 31));
@@ -63,7 +63,7 @@ pub(crate) fn bricks() -> Vec<u8> {
 
 /// Height of the bricks above the joints, relative to the texture's width.
 fn brick_height(u: f64, v: f64) -> f64 {
-    let (_, inside) = brick_index_and_joint_distance(u, v);
+    let (_, inside) = brick_index_and_mask(u, v);
     0.006 * inside + 0.002 * fractal_noise([u * 16.0, v * 16.0, 0.5], 3, 16, 31)
 }
 

@@ -342,8 +342,8 @@ fn orthographic_footprints_ignore_distance() {
     }
 }
 
-/// Parallel rays that start inside glass are tinted, whether they leave it or end at a light inside. Rays that
-/// start in air are not.
+/// Parallel rays that start inside glass are tinted, whether they leave it or end at a light inside. Rays
+/// that start in air are not.
 #[test]
 fn parallel_rays_can_start_in_glass() {
     let gray = || tinted(1.0, DVec3::splat(0.5));

@@ -319,8 +319,8 @@ impl Build {
         World::new(&self.scene, &parts, geometry, lights)
     }
 
-    /// Values of the only pixel seen from each position toward the origin, with one sample. Geometry and lights
-    /// are built only once.
+    /// Values of the only pixel seen from each position toward the origin, with one sample. Geometry and
+    /// lights are built only once.
     pub fn values_from(&self, positions: &[DVec3]) -> Vec<f64> {
         let mut build = self.clone().seen(positions[0], DVec3::ZERO);
         let (first, settings) = (build.world(), build.settings(0));

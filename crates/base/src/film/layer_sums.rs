@@ -24,8 +24,8 @@ impl LayerSums {
         Self { count, sums: vec![DVec3::ZERO; count * area], negative: Vec::new() }
     }
 
-    /// Adds consecutive samples to a pixel. Each sample has three values per layer. `is_negative` contains one
-    /// flag per sample if the filter has negative lobes. Non-finite values are treated as black.
+    /// Adds consecutive samples to a pixel. Each sample has three values per layer. `is_negative` contains
+    /// one flag per sample if the filter has negative lobes. Non-finite values are treated as black.
     #[inline(always)]
     pub fn add_pixel_samples(&mut self, pixel: usize, values: &[f32], is_negative: Option<&[bool]>) {
         let (pixel, size) = (pixel * self.count..(pixel + 1) * self.count, 3 * self.count);

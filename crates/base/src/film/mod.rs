@@ -28,7 +28,7 @@ pub mod tone;
 
 pub use convergence::ConvergenceModel;
 pub use layer_sums::{ALL_LAYER_VALUES, LayerSums};
-pub use noise::{HalfCellNoise, NoiseAndConvergenceRate, total_samples_to_reduce_error};
+pub use noise::{HalfNoise, NoiseAndConvergenceRate, total_samples_to_reduce_error};
 pub use pixel_subset::{PixelSubset, SelectedPixels};
 pub use prepass::{BrightnessPrepassPixels, PREPASS_SAMPLES};
 pub use preview::Previewer;

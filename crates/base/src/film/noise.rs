@@ -13,7 +13,7 @@ pub fn total_samples_to_reduce_error(power: f64, part: f64, count: u32) -> u32 {
 
 /// Noise in one half of a cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct HalfCellNoise {
+pub struct HalfNoise {
     /// Mean variance of the pixels' luminance.
     pub variance: f64,
     /// Mean luminance.
@@ -48,7 +48,7 @@ impl NoiseSums {
         if self.left > 0.0 { libm::log2(self.variance / self.left) } else { 1.0 }
     }
 
-    fn add_cell_half(&mut self, noise: &HalfCellNoise, pixels: f64) {
+    fn add_cell_half(&mut self, noise: &HalfNoise, pixels: f64) {
         self.variance += pixels * noise.variance;
         self.left += pixels * noise.variance * libm::exp2(-noise.power);
         self.mean += pixels * noise.mean;
@@ -121,7 +121,7 @@ impl Film {
 
     /// Noise in one half of a cell, or `None` if the half has no pixels or if a pixel has fewer than two
     /// samples.
-    pub fn noise_in_cell_half(&self, number: usize, half: usize) -> Option<HalfCellNoise> {
+    pub fn noise_in_cell_half(&self, number: usize, half: usize) -> Option<HalfNoise> {
         let tile = self.lock_tile(number / CELLS);
         let (mut pixels, mut samples, mut sum) = (0_u32, u32::MAX, 0.0);
         for pixel in self.pixel_indices_in_noise_cell_half(number, half) {
@@ -136,12 +136,7 @@ impl Film {
             samples,
             false,
         )?;
-        Some(HalfCellNoise {
-            variance: variance / pixels,
-            mean: sum / pixels,
-            samples,
-            power: libm::log2(rate),
-        })
+        Some(HalfNoise { variance: variance / pixels, mean: sum / pixels, samples, power: libm::log2(rate) })
     }
 
     /// Factor by which the last doubling reduced a tile's variance, measured in the half-cells that have
@@ -161,7 +156,7 @@ impl Film {
 
     /// Combined noise in one half of every cell in a tile. Returns `None` under the same conditions as
     /// [`Film::noise_in_cell_half`].
-    pub fn noise_in_tile_half(&self, tile: usize, half: usize) -> Option<HalfCellNoise> {
+    pub fn noise_in_tile_half(&self, tile: usize, half: usize) -> Option<HalfNoise> {
         let (mut pixels, mut samples, mut sums) = (0.0, u32::MAX, NoiseSums::default());
         for cell in CELLS * tile..CELLS * (tile + 1) {
             let count = self.cell_half_pixel_count(cell, half) as f64;
@@ -174,7 +169,7 @@ impl Film {
         }
         let (variance, mean, power) =
             (sums.variance / pixels, sums.mean / pixels, sums.squared_error_decay_exponent());
-        (pixels > 0.0).then_some(HalfCellNoise { variance, mean, samples, power })
+        (pixels > 0.0).then_some(HalfNoise { variance, mean, samples, power })
     }
 
     /// Relative mean squared error of a half-cell after the first `count` samples per pixel, and its

@@ -10,8 +10,8 @@ pub enum DataBrightnessMap {
     /// Leaves the values unchanged.
     #[default]
     None,
-    /// A mapping whose range is unknown until [`DataBrightnessMap::with_image_range`] sets it. Maps everything to
-    /// black.
+    /// A mapping whose range is unknown until [`DataBrightnessMap::with_image_range`] sets it. Maps
+    /// everything to black.
     Unresolved(DataKind),
     /// A mapping for values in this range.
     Resolved(DataKind, DataRange),

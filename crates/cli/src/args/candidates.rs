@@ -38,7 +38,7 @@ pub(crate) fn any_scene_completer() -> ArgValueCompleter {
     ArgValueCompleter::new(PathCompleter::file().filter(is_scene))
 }
 
-/// Completes scenes and foreign files.
+/// Completes glimt scenes, scenes of other renderers, and models.
 pub(crate) fn scene_or_model_completer() -> ArgValueCompleter {
     ArgValueCompleter::new(
         PathCompleter::file().filter(|path| has_toml_extension(path) || has_foreign_extension(path)),

@@ -28,7 +28,7 @@ struct StepTarget {
     budget: Option<f64>,
 }
 
-/// Measurement of a method on a scene.
+/// Measures a method on a scene.
 pub(super) struct MethodMeasurer<'a> {
     pub(super) run: &'a SceneRun<'a>,
     /// Overrides shared by all images and the references.

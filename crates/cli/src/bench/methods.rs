@@ -6,7 +6,7 @@ use crate::scene::description::{Accel, Integrator, Scene, ShadowMode};
 
 /// Values to measure for each setting, in all combinations. An empty list keeps the scene's value.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct MethodSweep {
+pub struct SweptSettingValues {
     /// Integrators.
     pub integrators: Vec<Integrator>,
     /// Whether to use photon mapping in whitted.
@@ -40,11 +40,11 @@ struct MethodSettings {
 
 /// The methods to measure on a scene. By default, these are path, whitted with photons, and the scene's own
 /// settings if they differ from both.
-pub fn methods_to_measure(scene: &Scene, toggles: &MethodSweep) -> Vec<Method> {
-    let all = if *toggles == MethodSweep::default() {
+pub fn methods_to_measure(scene: &Scene, swept: &SweptSettingValues) -> Vec<Method> {
+    let all = if *swept == SweptSettingValues::default() {
         default_benchmark_methods(scene)
     } else {
-        sweep_combinations(scene, toggles)
+        sweep_combinations(scene, swept)
     };
     let mut distinct: Vec<MethodSettings> = Vec::new();
     for settings in all {
@@ -52,7 +52,7 @@ pub fn methods_to_measure(scene: &Scene, toggles: &MethodSweep) -> Vec<Method> {
             distinct.push(settings);
         }
     }
-    distinct.into_iter().map(|settings| create_method_from_settings(settings, toggles)).collect()
+    distinct.into_iter().map(|settings| create_method_from_settings(settings, swept)).collect()
 }
 
 fn default_benchmark_methods(scene: &Scene) -> Vec<MethodSettings> {
@@ -70,13 +70,13 @@ fn default_benchmark_methods(scene: &Scene) -> Vec<MethodSettings> {
     ways.into_iter().map(of).collect()
 }
 
-fn sweep_combinations(scene: &Scene, toggles: &MethodSweep) -> Vec<MethodSettings> {
+fn sweep_combinations(scene: &Scene, swept: &SweptSettingValues) -> Vec<MethodSettings> {
     let mut ways = Vec::new();
-    for integrator in requested_or_scene_values(&toggles.integrators, scene.render.integrator) {
-        for photons in requested_or_scene_values(&toggles.photons, scene.photons.enabled) {
-            for shadows in requested_or_scene_values(&toggles.shadows, scene.render.shadows) {
-                for clamp in requested_or_scene_values(&toggles.clamps, scene.render.clamp) {
-                    for accel in requested_or_scene_values(&toggles.accels, scene.render.accel) {
+    for integrator in requested_or_scene_values(&swept.integrators, scene.render.integrator) {
+        for photons in requested_or_scene_values(&swept.photons, scene.photons.enabled) {
+            for shadows in requested_or_scene_values(&swept.shadows, scene.render.shadows) {
+                for clamp in requested_or_scene_values(&swept.clamps, scene.render.clamp) {
+                    for accel in requested_or_scene_values(&swept.accels, scene.render.accel) {
                         ways.push(normalize_method_settings(integrator, photons, shadows, clamp, accel));
                     }
                 }
@@ -103,20 +103,20 @@ fn normalize_method_settings(
 }
 
 /// Creates a method, named after the requested settings.
-fn create_method_from_settings(settings: MethodSettings, toggles: &MethodSweep) -> Method {
+fn create_method_from_settings(settings: MethodSettings, swept: &SweptSettingValues) -> Method {
     let mut words = vec![settings.integrator.name().to_owned()];
     if let Some((photons, shadows)) = settings.of_whitted {
         if photons {
             words.push("photons".to_owned());
         }
-        if !toggles.shadows.is_empty() {
+        if !swept.shadows.is_empty() {
             words.push(format!("shadows {}", shadows.name()));
         }
     }
-    if !toggles.clamps.is_empty() {
+    if !swept.clamps.is_empty() {
         words.push(format!("clamp {}", settings.clamp));
     }
-    if !toggles.accels.is_empty() {
+    if !swept.accels.is_empty() {
         words.push(settings.accel.name().to_owned());
     }
     let overrides = Overrides {
@@ -142,13 +142,13 @@ mod tests {
         crate::scene::load(&path, &[]).expect("a scene").scene
     }
 
-    fn names(text: &str, toggles: &MethodSweep) -> Vec<String> {
-        methods_to_measure(&scene(text), toggles).into_iter().map(|method| method.name).collect()
+    fn names(text: &str, swept: &SweptSettingValues) -> Vec<String> {
+        methods_to_measure(&scene(text), swept).into_iter().map(|method| method.name).collect()
     }
 
     #[test]
     fn default_methods_include_the_scene_settings() {
-        let none = MethodSweep::default();
+        let none = SweptSettingValues::default();
         assert_eq!(names("", &none), ["path", "whitted photons", "whitted"]);
         assert_eq!(names("[photons]\nenabled = true\n", &none), ["path", "whitted photons"]);
         assert_eq!(names("[render]\nintegrator = \"path\"\n", &none), ["path", "whitted photons"]);
@@ -156,13 +156,13 @@ mod tests {
 
     #[test]
     fn all_distinct_combinations_are_measured() {
-        let toggles = MethodSweep {
+        let swept = SweptSettingValues {
             integrators: vec![Integrator::Path, Integrator::Whitted],
             photons: vec![true, false],
             shadows: vec![ShadowMode::Soft, ShadowMode::Hard],
-            ..MethodSweep::default()
+            ..SweptSettingValues::default()
         };
-        let names = names("", &toggles);
+        let names = names("", &swept);
         assert_eq!(
             names,
             [
@@ -173,19 +173,20 @@ mod tests {
                 "whitted shadows hard"
             ]
         );
-        let accels = MethodSweep {
+        let accels = SweptSettingValues {
             accels: vec![Accel::Bvh, Accel::KdTree],
             clamps: vec![2.5],
-            ..MethodSweep::default()
+            ..SweptSettingValues::default()
         };
         assert_eq!(self::names("", &accels), ["whitted clamp 2.5 bvh", "whitted clamp 2.5 kdtree"]);
     }
 
     #[test]
     fn methods_override_scene_settings() {
-        let toggles = MethodSweep { integrators: vec![Integrator::Whitted], ..MethodSweep::default() };
-        let method = methods_to_measure(&scene("[render]\nclamp = 3\n[photons]\nenabled = true\n"), &toggles)
-            .remove(0);
+        let swept =
+            SweptSettingValues { integrators: vec![Integrator::Whitted], ..SweptSettingValues::default() };
+        let method =
+            methods_to_measure(&scene("[render]\nclamp = 3\n[photons]\nenabled = true\n"), &swept).remove(0);
         let overrides = &method.overrides;
         assert_eq!(
             (overrides.photons, overrides.shadows, overrides.clamp),

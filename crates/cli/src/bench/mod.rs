@@ -23,7 +23,7 @@ mod time_budget;
 
 pub use bias::{MIN_SEEDS, SquaredBias};
 pub use brightness::BrightnessDifference;
-pub use methods::{Method, MethodSweep, methods_to_measure};
+pub use methods::{Method, SweptSettingValues, methods_to_measure};
 pub use request::{BenchError, BenchEvent, BenchRequest, PartialResultsError, ReferenceSource, StepSchedule};
 pub use results::{
     BiasVerdict, ImageMeasurement, MethodAnalysis, ReferenceResult, Results, SceneResult, StepResult,

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::methods::MethodSweep;
+use super::methods::SweptSettingValues;
 use super::results::Results;
 use crate::pipeline::headless::AbortReason;
 use crate::pipeline::protocol::Failure;
@@ -22,7 +22,7 @@ pub struct BenchRequest {
     /// Height in pixels. The default is computed from the width and the scene's aspect ratio.
     pub height: Option<u32>,
     /// Settings that define the methods.
-    pub toggles: MethodSweep,
+    pub swept: SweptSettingValues,
     /// Sample counts or render times to measure.
     pub steps: StepSchedule,
     /// Images per step.

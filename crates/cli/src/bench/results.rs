@@ -278,7 +278,7 @@ pub(super) mod tests {
         let method = synthetic_method("whitted", 0.02, 0.01);
         let (all, last) = (method.slope.expect("a slope"), method.last_slope.expect("a slope"));
         assert!(all.value < -0.15 && last.value > -0.1, "{all:?} {last:?}");
-        assert!((self::synthetic_method("path", 0.2, 0.0).slope.expect("a slope").value + 1.0).abs() < 1e-9);
+        assert!((synthetic_method("path", 0.2, 0.0).slope.expect("a slope").value + 1.0).abs() < 1e-9);
     }
 
     #[test]

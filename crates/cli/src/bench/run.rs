@@ -180,7 +180,7 @@ impl SceneRun<'_> {
     fn measure(&self, budget: &mut TimeBudget, threads: &mut usize) -> Result<SceneResult, BenchError> {
         let mut session = HeadlessSession::default();
         let ValidatedScene { scene, given, common, keys } = self.load_and_validate(&mut session)?;
-        let methods = methods_to_measure(&scene, &self.request.toggles);
+        let methods = methods_to_measure(&scene, &self.request.swept);
         budget.begin_scene(methods.len());
         let reference = match given {
             Some(reference) => reference,

@@ -15,8 +15,8 @@ use crate::args::BenchArgs;
 use crate::bench::baseline::{compare_runs, format_changes};
 use crate::bench::table::format_results;
 use crate::bench::{
-    self, BenchError, BenchEvent, BenchRequest, MethodSweep, PartialResultsError, ReferenceSource, Results,
-    StepSchedule, cache,
+    self, BenchError, BenchEvent, BenchRequest, PartialResultsError, ReferenceSource, Results, StepSchedule,
+    SweptSettingValues, cache,
 };
 use crate::console::Console;
 use crate::control::CancelToken;
@@ -187,7 +187,7 @@ fn bench_request(args: &BenchArgs, console: &Console) -> Result<BenchRequest, Ex
         },
         width: args.width,
         height: args.height,
-        toggles: MethodSweep {
+        swept: SweptSettingValues {
             integrators: args.integrator.clone(),
             photons: args.photons.iter().copied().map(bool::from).collect(),
             shadows: args.shadows.clone(),

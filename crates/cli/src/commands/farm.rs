@@ -125,7 +125,7 @@ fn part_render_command(args: &FarmArgs, index: &str) -> String {
     format!("glimt {scene} --once -o {part} --shard {index}/{} --resume{options}", args.shards)
 }
 
-/// Returns the file name for one part, quoted for the shell.
+/// Returns the path of one part, quoted for the shell.
 fn shell_quoted_part_path(args: &FarmArgs, index: &str) -> String {
     format!("{}.{index}.part", quote_word(&disambiguate_path_argument(&args.output)))
 }

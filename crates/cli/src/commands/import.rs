@@ -43,8 +43,8 @@ fn convert_and_write(args: &ImportArgs, console: &Console, token: &CancelToken) 
         );
     }
     let options = args.foreign.options();
-    // A scene may come from a stranger. Its files are copied only if they are meshes and images, so that it cannot
-    // obtain private files.
+    // A scene may come from a stranger. Its files are copied only if they are meshes and images, so that it
+    // cannot obtain private files.
     if !has_model_extension(&args.file) && has_foreign_extension(&args.file) {
         match check_scene_with_options(&args.file, &[], &options, token) {
             Ok(_) => {}

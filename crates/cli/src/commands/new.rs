@@ -40,7 +40,7 @@ pub(crate) fn run(file: &Path, with_schema: bool, console: &Console) -> Exit {
         }
     }
     let name = file.display();
-    match write::create_new(file, text.as_bytes()) {
+    match write::write_new_file(file, text.as_bytes()) {
         Ok(()) => {
             console.print_line_to_stderr(&format!("wrote {name}"));
             if let Some(file) = quote_file_name_for_shell(file) {
@@ -71,7 +71,7 @@ pub(crate) fn run(file: &Path, with_schema: bool, console: &Console) -> Exit {
 /// Returns an error if a different file with this name exists, or if the file cannot be written.
 fn write_schema(path: &Path) -> Result<bool, (Exit, String)> {
     let text = schema::schema_text(SchemaDraft::Four);
-    match write::create_new(path, text.as_bytes()) {
+    match write::write_new_file(path, text.as_bytes()) {
         Ok(()) => Ok(true),
         Err(error) if error.kind() == ErrorKind::AlreadyExists => match std::fs::read(path) {
             Ok(there) if there == text.as_bytes() => Ok(false),

@@ -150,7 +150,7 @@ pub struct LoadedMesh {
 
 impl LoadedMesh {
     /// Whether the mesh has no normals and consists of flat faces, like a box.
-    pub fn has_flat_faces_and_no_normals(&self) -> bool {
+    pub fn is_polyhedral_without_normals(&self) -> bool {
         mesh::normals::is_polyhedral_without_normals(&self.mesh)
     }
 

@@ -69,7 +69,7 @@ pub struct ApproximateFileIdentity {
 }
 
 impl ApproximateFileIdentity {
-    /// Returns the fallback identity of the file at a path, or `None` if there is no regular file.
+    /// Returns the approximate identity of the file at a path, or `None` if there is no regular file.
     pub fn from_path(path: &Path) -> Option<Self> {
         let found = fs::metadata(path).ok().filter(fs::Metadata::is_file)?;
         let real = path.canonicalize().ok()?;

@@ -1,8 +1,8 @@
 //! Encodes images and writes files.
 //!
-//! [`check_image_target`] is called before rendering. [`encode`] encodes in memory. [`write::write_atomically`] writes to
-//! disk and leaves the file either complete or unchanged. Two paths with the same [`FileIdentity`] refer to
-//! the same file.
+//! [`check_image_target`] is called before rendering. [`encode`] encodes in memory.
+//! [`write::write_atomically`] writes to disk and leaves the file either complete or unchanged. Two paths
+//! with the same [`FileIdentity`] refer to the same file.
 
 pub mod animation;
 mod attributes;

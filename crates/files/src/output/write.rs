@@ -45,7 +45,7 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
 ///
 /// # Errors
 /// System errors such as [`ErrorKind::AlreadyExists`].
-pub fn create_new(path: &Path, bytes: &[u8]) -> io::Result<()> {
+pub fn write_new_file(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let mut file = OpenOptions::new().write(true).create_new(true).open(path)?;
     let written = file.write_all(bytes).and_then(|()| file.sync_all());
     if written.is_err()
@@ -97,8 +97,8 @@ pub fn write_atomically_with_policy(
     write_atomically_from_callback(path, &content, guard, token, Durability::Power).map(drop)
 }
 
-/// Like [`write_atomically_with_policy`], but replaces the file only if it has the expected content. If the content has
-/// changed, the file is kept and `guard` determines the error.
+/// Like [`write_atomically_with_policy`], but replaces the file only if it has the expected content. If the
+/// content has changed, the file is kept and `guard` determines the error.
 ///
 /// # Errors
 /// Same as [`write_atomically_with_policy`].
@@ -124,9 +124,9 @@ pub enum Durability {
     Power,
 }
 
-/// Like [`write_atomically_with_policy`], but for generated content. `content` must write all bytes each time it is
-/// called. Returns the new file, which stays locked until it is closed, or `None` if the target was written
-/// in place.
+/// Like [`write_atomically_with_policy`], but for generated content. `content` must write all bytes each time
+/// it is called. Returns the new file, which stays locked until it is closed, or `None` if the target was
+/// written in place.
 ///
 /// # Errors
 /// Any error from [`write_atomically_with_policy`] or `content`.
@@ -140,8 +140,8 @@ pub fn write_atomically_from_callback(
     write_atomically_or_in_place(path, content, guard, token, durability, None, &sync_directory)
 }
 
-/// Like [`write_atomically_from_callback`], but if `expected` is set, replaces only a file with this content. `sync`
-/// synchronizes a directory.
+/// Like [`write_atomically_from_callback`], but if `expected` is set, replaces only a file with this content.
+/// `sync` synchronizes a directory.
 pub(super) fn write_atomically_or_in_place(
     path: &Path,
     content: &dyn Fn(&mut dyn Write) -> io::Result<()>,
@@ -204,8 +204,8 @@ pub(super) fn write_atomically_or_in_place(
     }
 }
 
-/// Makes exceeding `ulimit -f` an error instead of a fatal signal (SIGXFSZ). [`write_atomically`] calls this function.
-/// Call it once before writing files in other ways.
+/// Makes exceeding `ulimit -f` an error instead of a fatal signal (SIGXFSZ). [`write_atomically`] calls this
+/// function. Call it once before writing files in other ways.
 pub fn ignore_file_size_signal() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {

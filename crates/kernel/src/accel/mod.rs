@@ -18,7 +18,7 @@ mod watertight_packet_tests;
 
 pub use bvh::{AnyHitCallback, Bvh, ClosestHitCallback, PrimitiveOrSubtreeAroundBox, SphericalShell};
 pub use kd_tree::KdTree;
-pub use ray_interval::{NodeBoundsAndDepth, RayBoxInterval};
+pub use ray_interval::{RayBoxInterval, VisitedNode};
 pub use wide_bvh::{InstructionSet, SimdKernel, WideBvh};
 
 pub use crate::geometry::packet::{F32x16, PACKET_SIZE};

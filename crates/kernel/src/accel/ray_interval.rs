@@ -4,7 +4,7 @@ use crate::geometry::{Aabb, Ray};
 
 /// A tree node.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct NodeBoundsAndDepth {
+pub struct VisitedNode {
     /// Bounding box.
     pub bounds: Aabb,
     /// Number of ancestors.

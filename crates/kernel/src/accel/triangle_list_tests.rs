@@ -12,13 +12,13 @@ use crate::math::random::signed_number_generator;
 
 /// Runs closest-hit and any-hit queries. Returns the nearest hits and three masks: undecided closest-hit
 /// rays, rays that hit any triangle other than `except`, and undecided any-hit rays.
-struct TriangleListQueryKernel<'a> {
+struct BruteForceQueryKernel<'a> {
     facets: &'a BruteForceTriangles,
     rays: &'a [Ray],
     except: &'a [u32; PACKET_SIZE],
 }
 
-impl SimdKernel for TriangleListQueryKernel<'_> {
+impl SimdKernel for BruteForceQueryKernel<'_> {
     type Output = (HitPacket, [u32; 3]);
 
     #[inline(always)]
@@ -124,7 +124,7 @@ fn decided_packets_match_single_rays() {
             std::array::from_fn(|i| if i % 3 == 0 { any(&mut next) as u32 } else { u32::MAX });
         for instructions in InstructionSet::ALL {
             let (found, [open, hits_any, open_any]) =
-                instructions.run(TriangleListQueryKernel { facets: &facets, rays: &rays, except: &except });
+                instructions.run(BruteForceQueryKernel { facets: &facets, rays: &rays, except: &except });
             for (i, ray) in rays.iter().enumerate() {
                 let (own, other) =
                     (single_ray_hit(&triangles, ray, u32::MAX), single_ray_hit(&triangles, ray, except[i]));
@@ -159,7 +159,7 @@ fn nan_rays_are_undecided() {
             Ray::new(Vec3::splat(0.1), Vec3::new(a, b, a)),
         ] {
             for instructions in InstructionSet::ALL {
-                let (found, [open, any, open_any]) = instructions.run(TriangleListQueryKernel {
+                let (found, [open, any, open_any]) = instructions.run(BruteForceQueryKernel {
                     facets: &facets,
                     rays: &[ray],
                     except: &[u32::MAX; PACKET_SIZE],

@@ -357,7 +357,7 @@ mod tests {
     }
 
     impl SlenderShape for Cone {
-        fn thin(radius: f64, capped: bool) -> Self {
+        fn slender(radius: f64, capped: bool) -> Self {
             Self::new(DVec3::NEG_Z, DVec3::Z, radius, capped)
         }
 

@@ -299,7 +299,7 @@ mod tests {
     }
 
     impl SlenderShape for Cylinder {
-        fn thin(radius: f64, capped: bool) -> Self {
+        fn slender(radius: f64, capped: bool) -> Self {
             Self::new(DVec3::NEG_Z, DVec3::Z, radius, capped)
         }
 

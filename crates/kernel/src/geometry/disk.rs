@@ -134,7 +134,7 @@ impl Disk {
         DVec2::new((local.truncate().length() - self.radius).max(0.0), local.z).length()
     }
 
-    /// Local geometry of the disk near a point, for density estimation.
+    /// The polygons or the surface of the disk near a point, for density estimation.
     pub fn polygons_or_surface_near(&self, point: DVec3) -> NearbyGeometry {
         let (normal, from) = (self.normal(), point - self.centroid());
         let extent = FlatOrRoundExtent::Flat(self.radius - from.length());

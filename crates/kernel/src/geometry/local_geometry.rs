@@ -11,7 +11,8 @@ pub type FlatPolygon = ArrayVec<DVec3, 4>;
 /// Shape geometry near a point, for integrating a density-estimation kernel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum NearbyGeometry {
-    /// Number of flat polygons that form the shape. See [`Shape::polygon_face_at`](super::Shape::polygon_face_at).
+    /// Number of flat polygons that form the shape. See
+    /// [`Shape::nth_polygon_face`](super::Shape::nth_polygon_face).
     Polygons(u32),
     /// A non-polygonal surface.
     Surface {

@@ -344,7 +344,7 @@ impl Shape {
         }
     }
 
-    /// Local geometry of the shape near a point, for density estimation.
+    /// The polygons or the surface of the shape near a point, for density estimation.
     #[inline]
     pub fn polygons_or_surface_near(&self, point: DVec3) -> NearbyGeometry {
         match self {
@@ -369,7 +369,7 @@ impl Shape {
     /// Returns the flat polygon with the given index, or `None` if the index is out of range or the shape is
     /// not made of flat polygons.
     #[inline]
-    pub fn polygon_face_at(&self, number: u32) -> Option<FlatPolygon> {
+    pub fn nth_polygon_face(&self, number: u32) -> Option<FlatPolygon> {
         match self {
             Self::Quad(quad) => {
                 (number < 1).then(|| polygon_from_parallelogram((quad.corner, quad.u, quad.v)))
@@ -384,7 +384,7 @@ impl Shape {
             | Self::Cylinder(_)
             | Self::Cone(_)
             | Self::Torus(_) => None,
-            Self::Transformed(transformed) => transformed.polygon_face_at(number),
+            Self::Transformed(transformed) => transformed.nth_polygon_face(number),
         }
     }
 

@@ -105,7 +105,7 @@ impl Plane {
         (point - self.point).dot(self.normal).abs()
     }
 
-    /// Local geometry of the plane near a point, for density estimation.
+    /// The polygons or the surface of the plane near a point, for density estimation.
     pub fn polygons_or_surface_near(&self, point: DVec3) -> NearbyGeometry {
         let distance = self.unsigned_distance(point);
         let ground = NearestSurface {

@@ -117,7 +117,7 @@ impl Sphere {
         ((point - self.center).length() - self.radius).abs()
     }
 
-    /// Local geometry of the sphere near a point, for density estimation.
+    /// The polygons or the surface of the sphere near a point, for density estimation.
     pub fn polygons_or_surface_near(&self, point: DVec3) -> NearbyGeometry {
         let (distance, out) = (self.distance_from_point(point), (point - self.center).normalize_or_zero());
         let ground =

@@ -285,10 +285,10 @@ pub(super) mod tests {
         }
     }
 
-    /// A thin shape around the z axis from −1 to 1, used by [`check_hits_from_afar`].
+    /// A slender shape around the z axis from −1 to 1, used by [`check_hits_from_afar`].
     pub trait SlenderShape {
         /// Creates a thin shape with the given radius.
-        fn thin(radius: f64, capped: bool) -> Self;
+        fn slender(radius: f64, capped: bool) -> Self;
 
         /// Nearest hit.
         fn intersect_nearest(&self, ray: &RayF64) -> Option<(f64, u32)>;
@@ -304,7 +304,7 @@ pub(super) mod tests {
     pub fn check_hits_from_afar<T: SlenderShape + std::fmt::Debug>() {
         let mut ambiguous = 0;
         for (i, capped) in (0..4000_u32).flat_map(|i| [(i, true), (i, false)]) {
-            let thin = T::thin(0.01, capped);
+            let thin = T::slender(0.01, capped);
             let across = f64::from(i) * 0.618_034 % 1.0 - 0.5;
             let along = f64::from(i) * 0.754_877_7 % 1.0 * 3.0 - 1.5;
             let at = DVec3::new(0.0, across * 0.02, along);

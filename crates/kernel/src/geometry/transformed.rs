@@ -156,7 +156,8 @@ impl TransformedShape {
         0.5 * self.volume_scale * forms / (area * area * area)
     }
 
-    /// Local geometry of the shape near a point, for density estimation. The distance is a lower bound.
+    /// The polygons or the surface of the shape near a point, for density estimation. The distance is a lower
+    /// bound.
     pub fn polygons_or_surface_near(&self, point: DVec3) -> NearbyGeometry {
         let ground_to_world = |ground: NearestSurface| match ground.extent {
             FlatOrRoundExtent::Flat(extent) => {
@@ -179,10 +180,10 @@ impl TransformedShape {
         }
     }
 
-    /// [`Shape::polygon_face_at`] in world coordinates.
-    pub fn polygon_face_at(&self, number: u32) -> Option<FlatPolygon> {
+    /// [`Shape::nth_polygon_face`] in world coordinates.
+    pub fn nth_polygon_face(&self, number: u32) -> Option<FlatPolygon> {
         let mut corners: FlatPolygon =
-            self.shape.polygon_face_at(number)?.iter().map(|corner| self.to_world.point(*corner)).collect();
+            self.shape.nth_polygon_face(number)?.iter().map(|corner| self.to_world.point(*corner)).collect();
         if self.to_world.flips_handedness() {
             corners.reverse();
         }

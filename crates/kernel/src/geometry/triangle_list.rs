@@ -121,8 +121,8 @@ struct ErrorTerms {
 }
 
 impl BruteForceTriangles {
-    /// Creates a list of triangles. Returns `None` if there are too many, if one is too slender for the error
-    /// bounds, or if their coordinates or extent are out of range.
+    /// Prepares triangles for brute-force tests. Returns `None` if there are too many, if one is too slender
+    /// for the error bounds, or if their coordinates or extent are out of range.
     pub fn new(corners: Vec<[Vec3; 3]>) -> Option<Self> {
         let points = || corners.iter().flatten().copied();
         let (low, high) = (points().reduce(Vec3::min)?, points().reduce(Vec3::max)?);

@@ -158,7 +158,7 @@ impl Light {
     pub fn has_no_angular_extent(&self) -> bool {
         match self.family() {
             LightFamily::Delta(_) => true,
-            LightFamily::Infinite(light) => light.is_single_direction(),
+            LightFamily::Infinite(light) => light.has_no_angular_extent(),
             LightFamily::Area(_) => false,
         }
     }
@@ -175,7 +175,7 @@ impl Light {
                 (LightCenter::Towards(light.direction_to_center()?), GeometryOfLight::Nothing)
             }
             LightFamily::Area(light) => {
-                (LightCenter::At(light.area_centroid().as_vec3()), light.scene_geometry_id())
+                (LightCenter::At(light.area_centroid().as_vec3()), light.geometry_of_light())
             }
         })
     }

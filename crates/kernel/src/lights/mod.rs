@@ -16,8 +16,8 @@
 //! # To add a light
 //!
 //! 1. In `delta/NAME.rs` or `infinite/NAME.rs`, add a struct that implements
-//!    [`DeltaPositionLight`](delta::DeltaPositionLight) or [`InfiniteLight`](infinite::InfiniteLight). An emitting shape
-//!    implements [`ShapeEmitter`](area::ShapeEmitter) in `area/NAME.rs`, see [`area`].
+//!    [`DeltaPositionLight`](delta::DeltaPositionLight) or [`InfiniteLight`](infinite::InfiniteLight). An
+//!    emitting shape implements [`ShapeEmitter`](area::ShapeEmitter) in `area/NAME.rs`, see [`area`].
 //! 2. In the folder's `mod.rs`, declare the module and re-export the struct.
 //! 3. In `light.rs`, add a variant and the match arms required by the compiler, for its family, sampling, and
 //!    pdf. Infinite lights must also be added to `set.rs`, which sums the radiance along rays that leave the
@@ -46,10 +46,10 @@ pub mod tree;
 
 pub use area::{
     AreaLight, BlendPartWeight, EmissionModulation, EmissionTerm, Emitter, EmittingPart, MeshEmitter, Side,
-    TriangleWithUvs, UvMapping, create_see_through_side_light, new_back_area_light, new_front_area_light,
+    TriangleWithUvs, UvMapping, new_back_area_light, new_front_area_light, new_see_through_side_light,
 };
 pub use light::{Light, LightFamily};
-pub use packet::{EmitterObjectPacket, LightSamplePacket};
+pub use packet::{GeometryOfLightPacket, LightSamplePacket};
 pub use photon_emission::{
     BoundingSphere, EmissiveObjectGeometry, EmittedPhoton, PhotonEmitter, PhotonOrigin, PhotonRandomNumbers,
 };

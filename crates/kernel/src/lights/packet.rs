@@ -15,7 +15,7 @@ pub struct LightSamplePacket {
     /// [`LightSample::weight`], or 0 for black samples.
     pub weights: Vec3x16,
     /// Geometry that the shadow rays ignore.
-    pub sources: EmitterObjectPacket,
+    pub sources: GeometryOfLightPacket,
     /// Mask of samples at infinity.
     pub beyond: u32,
     /// Inverse pdfs in sr, set only for environments. For other lights, they are computed on request.
@@ -25,16 +25,16 @@ pub struct LightSamplePacket {
 /// A packet of [`GeometryOfLight`]s.
 #[derive(Clone, Debug)]
 #[repr(align(64))]
-pub struct EmitterObjectPacket {
-    /// Object index, or [`EmitterObjectPacket::NONE`] if there is no geometry.
+pub struct GeometryOfLightPacket {
+    /// Object index, or [`GeometryOfLightPacket::NONE`] if there is no geometry.
     pub object: [u32; PACKET_SIZE],
-    /// Primitive index, or [`EmitterObjectPacket::NONE`] for the entire object.
+    /// Primitive index, or [`GeometryOfLightPacket::NONE`] for the entire object.
     pub part: [u32; PACKET_SIZE],
     /// Whether any lane has an object.
     pub is_any: bool,
 }
 
-impl EmitterObjectPacket {
+impl GeometryOfLightPacket {
     /// Marks a lane that has no object, or a lane that refers to an entire object.
     pub const NONE: u32 = u32::MAX;
 
@@ -77,9 +77,9 @@ impl EmitterObjectPacket {
 #[inline(always)]
 fn object_and_part_codes(source: GeometryOfLight) -> (u32, u32) {
     match source {
-        GeometryOfLight::Nothing => (EmitterObjectPacket::NONE, EmitterObjectPacket::NONE),
-        GeometryOfLight::Object(object) => (object, EmitterObjectPacket::NONE),
-        GeometryOfLight::SeeThrough(object) => (object, EmitterObjectPacket::SEE_THROUGH),
+        GeometryOfLight::Nothing => (GeometryOfLightPacket::NONE, GeometryOfLightPacket::NONE),
+        GeometryOfLight::Object(object) => (object, GeometryOfLightPacket::NONE),
+        GeometryOfLight::SeeThrough(object) => (object, GeometryOfLightPacket::SEE_THROUGH),
         GeometryOfLight::Primitive(object, part) => (object, part),
     }
 }
@@ -137,7 +137,7 @@ impl LightSamplePacket {
             directions: [[0.0; PACKET_SIZE]; 3],
             targets: [[0.0; PACKET_SIZE]; 3],
             weights: [[0.0; PACKET_SIZE]; 3],
-            sources: EmitterObjectPacket::splat(source),
+            sources: GeometryOfLightPacket::splat(source),
             beyond: 0,
             environment_inverse_pdfs: [0.0; PACKET_SIZE],
         }

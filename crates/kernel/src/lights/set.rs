@@ -109,7 +109,7 @@ impl Lights {
         for (number, light) in (0_u32..).zip(&all) {
             if let Some(light) = light.as_area() {
                 lights.add_light_to_object_index(number, light);
-            } else if let Some(sun) = light.as_directional().filter(|sun| !sun.is_single_direction()) {
+            } else if let Some(sun) = light.as_directional().filter(|sun| !sun.has_no_angular_extent()) {
                 lights.suns.push((number, sun.clone()));
             } else if let Some(light) = light.as_environment() {
                 lights.environment = Some((number, light.clone()));
@@ -254,8 +254,8 @@ impl Lights {
         }
     }
 
-    /// Radiance from infinity in a unit direction. `weight` returns the weight of a light, given its index and
-    /// its light-sampling pdf in sr⁻¹.
+    /// Radiance from infinity in a unit direction. `weight` returns the weight of a light, given its index
+    /// and its light-sampling pdf in sr⁻¹.
     pub fn radiance_from_infinity(&self, direction: Vec3, weight: impl Fn(u32, f32) -> f32) -> Vec3 {
         let sky = self.environment().map(|environment| environment.radiance_and_pdf(direction));
         self.radiance_from_infinity_with_precomputed_sky(sky, direction, weight)

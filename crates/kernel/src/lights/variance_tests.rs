@@ -165,8 +165,8 @@ fn textured_quad_samples_follow_their_pdf() {
     }
 }
 
-/// Checks that samples follow their pdf, which is evaluated once in each of `fine` × `fine` squares of a cell.
-/// Returns false if there are too few samples to decide.
+/// Checks that samples follow their pdf, which is evaluated once in each of `fine` × `fine` squares of a
+/// cell. Returns false if there are too few samples to decide.
 fn follows_its_pdf(name: &str, shape: &Shape, light: &AreaLight, from: Vec3, fine: usize) -> bool {
     let Some((directions, bins)) = histogram(light, from) else { return false };
     check_bins(name, &bins, &expected_counts(shape, light, from, &directions, fine))

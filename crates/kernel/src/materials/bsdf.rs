@@ -3,8 +3,8 @@
 //!
 //! To add a kind of BSDF, add a file that implements [`Bxdf`](super::bxdf::Bxdf), and a line in the table in
 //! [`bxdfs`](super::bxdfs). If its parameters differ from those of all other kinds, also implement
-//! [`SpatiallyVaryingBxdf`] and [`BxdfParameters`]. No other code distinguishes kinds: integrators call `f`, `pdf`,
-//! and `sample` of a [`BsdfPacket`](super::BsdfPacket) for all lanes at once.
+//! [`SpatiallyVaryingBxdf`] and [`BxdfParameters`]. No other code distinguishes kinds: integrators call `f`,
+//! `pdf`, and `sample` of a [`BsdfPacket`](super::BsdfPacket) for all lanes at once.
 
 use std::f32::consts::FRAC_1_PI;
 
@@ -166,7 +166,8 @@ pub trait SpatiallyVaryingBxdf {
     }
 
     /// The color that can be looked up for packets and set with
-    /// [`Bxdf::set_looked_up_color`](super::bxdf::Bxdf::set_looked_up_color), or `None` if there is no such color.
+    /// [`Bxdf::set_looked_up_color`](super::bxdf::Bxdf::set_looked_up_color), or `None` if there is no such
+    /// color.
     fn color_to_look_up(&self) -> Option<&ColorOrTexture> {
         None
     }

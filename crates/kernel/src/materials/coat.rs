@@ -136,8 +136,8 @@ impl Coat {
 }
 
 soa! {
-    /// A coat at a point, with the GGX or the Beckmann distribution. Its facets reflect according to the exact
-    /// Fresnel equations if `EXACT`, and otherwise according to Schlick's approximation.
+    /// A coat at a point, with the GGX or the Beckmann distribution. Its facets reflect according to the
+    /// exact Fresnel equations if `EXACT`, and otherwise according to Schlick's approximation.
     pub struct CoatLayer<const EXACT: bool, const BECKMANN: bool> in CoatLayerPacket {
         /// [`CoatPoint::weight`].
         pub weight: f32 = 0.0,

@@ -26,7 +26,8 @@ pub fn fresnel_dielectric_from_outside(cos_incident: f32, eta: f32) -> f32 {
     fresnel_from_eta_cos_squared(cos_incident, eta, (eta - 1.0) * (eta + 1.0) + cos_incident * cos_incident)
 }
 
-/// [`fresnel_dielectric`] for light from either side, in `f32` for packets. Returns 1 for total internal reflection.
+/// [`fresnel_dielectric`] for light from either side, in `f32` for packets. Returns 1 for total internal
+/// reflection.
 #[inline(always)]
 pub fn fresnel_dielectric_any_eta(cos_incident: f32, eta: f32) -> f32 {
     let squared = (eta - 1.0) * (eta + 1.0) + cos_incident * cos_incident;

@@ -225,8 +225,8 @@ impl SmithDirectionTerms {
         if self.is_direction_above_surface() & other.is_direction_above_surface() { value } else { 0.0 }
     }
 
-    /// Computes, from D, the pdf in sr⁻¹ of a direction that [`sample_reflected_direction`] samples for this view
-    /// direction.
+    /// Computes, from D, the pdf in sr⁻¹ of a direction that [`sample_reflected_direction`] samples for this
+    /// view direction.
     #[inline(always)]
     pub fn reflection_pdf(&self, distribution: f32) -> f32 {
         let pdf = distribution / (2.0 * (self.cosine + self.slope));
@@ -236,8 +236,8 @@ impl SmithDirectionTerms {
 
 impl SmithDirectionTerms {
     /// [`SmithDirectionTerms::reflection_pdf`], computed from the result of
-    /// [`SmithDirectionTerms::torrance_sparrow_without_fresnel`] instead of D. Returns 0 for directions below the
-    /// surface.
+    /// [`SmithDirectionTerms::torrance_sparrow_without_fresnel`] instead of D. Returns 0 for directions below
+    /// the surface.
     #[inline(always)]
     pub fn pdf_from_reflection_term(&self, other: &Self, reflected: f32) -> f32 {
         let both = self.cosine * other.slope + other.cosine * self.slope;

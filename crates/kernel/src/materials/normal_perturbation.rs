@@ -75,7 +75,7 @@ impl Bump {
     fn perturb(&self, at: &TexturePoint, normal: Vec3, bent: Vec3, tangents: [Vec3; 2]) -> Vec3 {
         let gradient = match self.texture.slopes(at) {
             HeightGradient::AlongUv(slopes) => {
-                let [dpdu, dpdv] = self.texture.uv_set_tangents(at, tangents);
+                let [dpdu, dpdv] = self.texture.untransformed_tangents(at, tangents);
                 let slopes = slopes * self.scale;
                 let volume = normal.dot(dpdu.cross(dpdv));
                 (dpdv.cross(normal) * slopes.x + normal.cross(dpdu) * slopes.y) / volume

@@ -1,7 +1,7 @@
 //! Textures: colors and numbers that vary over a surface.
 //!
-//! [`Texture`] is the interface between materials and the kinds of textures. A new kind of pattern needs a file,
-//! a variant of [`Pattern`] in `pattern.rs`, and its keys in the scene module's `document/textures.rs`.
+//! [`Texture`] is the interface between materials and the kinds of textures. A new kind of pattern needs a
+//! file, a variant of [`Pattern`] in `pattern.rs`, and its keys in the scene module's `document/textures.rs`.
 
 pub mod image;
 pub mod mapping;
@@ -87,7 +87,8 @@ impl Texture {
         self.mapping().map_or(UvSet::First, TextureMapping::uv_set)
     }
 
-    /// Slopes of the red channel, along u and v of [`Texture::uv_set_tangents`] or in world coordinates.
+    /// Slopes of the red channel, along u and v of [`Texture::untransformed_tangents`] or in world
+    /// coordinates.
     pub fn slopes(&self, at: &TexturePoint) -> HeightGradient {
         match self {
             Self::Image(image) => HeightGradient::AlongUv(image.slopes(at)),
@@ -95,9 +96,10 @@ impl Texture {
         }
     }
 
-    /// Tangents ∂p/∂u and ∂p/∂v of the UV set used for lookups. `first` contains the tangents of the first set.
+    /// Tangents ∂p/∂u and ∂p/∂v of the UV set used for lookups. `first` contains the tangents of the first
+    /// set.
     #[inline]
-    pub fn uv_set_tangents(&self, at: &TexturePoint, first: [Vec3; 2]) -> [Vec3; 2] {
+    pub fn untransformed_tangents(&self, at: &TexturePoint, first: [Vec3; 2]) -> [Vec3; 2] {
         self.mapping().map_or(first, |mapping| mapping.untransformed_tangents(at, first))
     }
 
@@ -110,8 +112,8 @@ impl Texture {
         }
     }
 
-    /// The fraction of the footprint where the red channel is at least `cutoff`. The mip levels of an image must
-    /// be computed from [`Texels::threshold_red_channel`](super::texels::Texels::threshold_red_channel).
+    /// The fraction of the footprint where the red channel is at least `cutoff`. The mip levels of an image
+    /// must be computed from [`Texels::threshold_red_channel`](super::texels::Texels::threshold_red_channel).
     pub fn coverage_above_cutoff(&self, at: &TexturePoint, cutoff: f32) -> f32 {
         match self {
             Self::Image(image) => image.coverage_above_cutoff(at, cutoff),

@@ -150,7 +150,7 @@ fn scene_of_mesh(
     if let Some(angles) = up.upright_rotation_degrees() {
         document.set("rotate", angles);
     }
-    if is_faceted || loaded.has_flat_faces_and_no_normals() {
+    if is_faceted || loaded.is_polyhedral_without_normals() {
         document.set("smooth", false);
     }
     if needs_material {

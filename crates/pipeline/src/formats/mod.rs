@@ -54,7 +54,7 @@ const FORMATS: [ForeignFormat; 6] = [
     ForeignFormat {
         extensions: &["pbrt"],
         is_model: false,
-        read: pbrt::read_glimt_scene,
+        read: pbrt::read,
         convert: Some(pbrt::import_with_assets),
     },
     ForeignFormat {

@@ -47,7 +47,8 @@ impl RequestCamera {
         world::choose_origin_near_camera_target(&self.camera, self.orbiter.as_ref())
     }
 
-    /// Returns the full contents of the orbiter file for use in fingerprints. They are too small to need a hash.
+    /// Returns the full contents of the orbiter file for use in fingerprints. They are too small to need a
+    /// hash.
     pub(crate) fn orbiter_fingerprint_text(&self) -> Option<String> {
         self.orbiter.map(|camera| format!("{camera:?}"))
     }

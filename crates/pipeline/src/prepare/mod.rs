@@ -64,7 +64,8 @@ impl SceneCache {
         Ok(stage.finish(parsed))
     }
 
-    /// Loads the meshes and the selected textures of a scene. Tries all files and adds errors to the findings.
+    /// Loads the meshes and the selected textures of a scene. Tries all files and adds errors to the
+    /// findings.
     ///
     /// # Errors
     /// The token is canceled, or there is not enough memory.

@@ -44,8 +44,8 @@ pub(crate) struct PendingCommandRunner<'a> {
 }
 
 impl PendingCommandRunner<'_> {
-    /// Carries out pending commands about the current film, if there is one. `is_covered` states whether every
-    /// pixel has a sample. Until then, a write command is postponed, which is reported once.
+    /// Carries out pending commands about the current film, if there is one. `is_covered` states whether
+    /// every pixel has a sample. Until then, a write command is postponed, which is reported once.
     pub(crate) fn run_pending(&self, film: Option<&FilmState>, is_covered: bool) {
         let ImageWriteContext { plan, inputs, sink, .. } = self.to;
         if let Some(film) = film.filter(|_| is_covered) {

@@ -292,7 +292,7 @@ impl FilmState {
 
     /// Decides which of the tiles with `samples` samples (a power of two) need no more samples.
     pub(crate) fn decide_tile_sample_goals(&mut self, samples: u32, error: f64) {
-        if let Some(judgement) = self.goals.decide_tile_sample_goals(&self.film, &self.done, samples, error) {
+        if let Some(judgement) = self.goals.decide_half_goals(&self.film, &self.done, samples, error) {
             self.expected.update_predictions(&judgement, &self.goals, &self.done);
         }
     }
@@ -427,7 +427,7 @@ mod tests {
     }
 
     /// Adds samples to a tile and records how long they took.
-    fn record_finished_job(state: &mut FilmState, tile: usize, samples: Range<u32>, seconds: f64) {
+    fn add_and_record_samples(state: &mut FilmState, tile: usize, samples: Range<u32>, seconds: f64) {
         let pixels = SelectedPixels::from(state.film.tile_rect(tile).expect("a tile"));
         let count = samples.end - samples.start;
         let radiance = (0..pixels.count() as u32 * count).map(|i| Vec3::splat((i % 7) as f32)).collect();
@@ -443,7 +443,7 @@ mod tests {
     fn remaining_cost_is_estimated_per_tile() {
         let mut state = state();
         let mut noted = |tile: usize, samples: Range<u32>, seconds: f64| {
-            record_finished_job(&mut state, tile, samples, seconds);
+            add_and_record_samples(&mut state, tile, samples, seconds);
             [state.cpu_seconds(), state.remaining_cpu_seconds(8, in_one)]
                 .map(|seconds| (seconds * 1e6).round() * 1e-6)
         };
@@ -459,8 +459,8 @@ mod tests {
     fn recent_samples_determine_the_cost() {
         let mut state = state();
         for tile in 0..2 {
-            record_finished_job(&mut state, tile, 0..1, 4.0);
-            record_finished_job(&mut state, tile, 1..2, 1.0);
+            add_and_record_samples(&mut state, tile, 0..1, 4.0);
+            add_and_record_samples(&mut state, tile, 1..2, 1.0);
         }
         assert_eq!(state.cpu_seconds(), 10.0);
         // The first job has a weight of 1/4 and the second a weight of 1, which gives 2 seconds for 1.25
@@ -477,8 +477,8 @@ mod tests {
         let mut state = state();
         // One second per sample plus three seconds of pixel overhead per job.
         for (samples, seconds) in [(0..1, 4.0), (1..2, 4.0), (2..4, 5.0)] {
-            record_finished_job(&mut state, 0, samples.clone(), seconds);
-            record_finished_job(&mut state, 1, samples, seconds);
+            add_and_record_samples(&mut state, 0, samples.clone(), seconds);
+            add_and_record_samples(&mut state, 1, samples, seconds);
         }
         let to_come = |jobs: u32| state.remaining_cpu_seconds(16, |_, _| jobs);
         assert!((to_come(1) - 2.0 * (12.0 + 3.0)).abs() < 1e-9, "{}", to_come(1));
@@ -488,12 +488,12 @@ mod tests {
     #[test]
     fn end_is_unknown_until_noise_is_measured() {
         let mut state = state();
-        record_finished_job(&mut state, 0, 0..1, 1.0);
-        record_finished_job(&mut state, 1, 0..1, 1.0);
+        add_and_record_samples(&mut state, 0, 0..1, 1.0);
+        add_and_record_samples(&mut state, 1, 0..1, 1.0);
         state.decide_tile_sample_goals(1, 0.1);
         assert!(!state.can_predict_samples(), "noise cannot be estimated from one sample");
-        record_finished_job(&mut state, 0, 1..2, 1.0);
-        record_finished_job(&mut state, 1, 1..2, 1.0);
+        add_and_record_samples(&mut state, 0, 1..2, 1.0);
+        add_and_record_samples(&mut state, 1, 1..2, 1.0);
         state.decide_tile_sample_goals(2, 0.1);
         assert!(state.can_predict_samples());
     }

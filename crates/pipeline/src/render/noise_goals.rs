@@ -7,7 +7,7 @@
 //! worst case, this is a thirtieth of the noise.
 
 use crate::film::{
-    BrightnessPrepassPixels, CELLS, ConvergenceModel, Film, HalfCellNoise, PREPASS_SAMPLES,
+    BrightnessPrepassPixels, CELLS, ConvergenceModel, Film, HalfNoise, PREPASS_SAMPLES,
     total_samples_to_reduce_error,
 };
 
@@ -63,7 +63,7 @@ impl CellSampleGoals {
     /// Decides the goals of undecided halves with `samples` samples (a power of two), based on the noise in
     /// the other half. `done` is the number of samples in each half. Decides nothing until all halves have
     /// enough samples to estimate the image's brightness. Runs in parallel within a thread pool.
-    pub(crate) fn decide_tile_sample_goals(
+    pub(crate) fn decide_half_goals(
         &mut self,
         film: &Film,
         done: &[[u32; 2]],
@@ -98,7 +98,7 @@ impl CellSampleGoals {
             let count = halves().count() as f64;
             let all =
                 halves().fold((0.0, 0.0), |(v, m), one| (v + one.variance / count, m + one.mean / count));
-            let whole = halves().next().map(|half| HalfCellNoise { variance: all.0, mean: all.1, ..half });
+            let whole = halves().next().map(|half| HalfNoise { variance: all.0, mean: all.1, ..half });
             let mut cells = self.decided.iter().skip(CELLS * tile).take(CELLS);
             whole.filter(|_| cells.all(is_decided)).map(|noise| aim.noise_relative_to_brightness(&noise))
         });
@@ -161,7 +161,7 @@ pub(crate) struct NoiseMeasurements {
 /// A tile's noise, measured from its samples.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TileNoise {
-    pub(crate) halves: [Option<HalfCellNoise>; 2],
+    pub(crate) halves: [Option<HalfNoise>; 2],
     /// Ratio of the variances before and after the last doubling of samples.
     pub(crate) fall: Option<f64>,
 }
@@ -172,7 +172,7 @@ impl TileNoise {
             let noise = film.noise_in_tile_half(tile, half)?;
             // Use an upper bound on the noise. If the noise comes from a few bright samples, there may be
             // other bright samples that have not been taken yet.
-            Some(HalfCellNoise {
+            Some(HalfNoise {
                 variance: noise.variance * (1.0 + film.tile_variance_uncertainty(tile, half)),
                 ..noise
             })
@@ -193,7 +193,7 @@ pub(crate) struct NoiseTarget {
 
 impl NoiseTarget {
     /// Returns the number of samples needed for the noise to reach the target.
-    fn samples_to_reach(&self, noise: &HalfCellNoise) -> u32 {
+    fn samples_to_reach(&self, noise: &HalfNoise) -> u32 {
         let relative = self.noise_relative_to_brightness(noise);
         if !(relative > 0.0) {
             return noise.samples;
@@ -212,7 +212,7 @@ impl NoiseTarget {
     }
 
     /// Returns the noise relative to the reference brightness.
-    pub(crate) fn noise_relative_to_brightness(&self, noise: &HalfCellNoise) -> f64 {
+    pub(crate) fn noise_relative_to_brightness(&self, noise: &HalfNoise) -> f64 {
         noise.variance.sqrt() / noise.mean.max(MIN_BRIGHTNESS * self.brightness)
     }
 }
@@ -243,7 +243,7 @@ pub(crate) mod tests {
 
     fn decided_goals(halves: [(f32, f32); 2], samples: u32, error: f64) -> CellSampleGoals {
         let mut goals = CellSampleGoals::new_undecided(1);
-        goals.decide_tile_sample_goals(&one_tile_film(halves, samples), &[[samples; 2]], samples, error);
+        goals.decide_half_goals(&one_tile_film(halves, samples), &[[samples; 2]], samples, error);
         goals
     }
 
@@ -310,7 +310,7 @@ pub(crate) mod tests {
             );
         }
         let mut goals = CellSampleGoals::new_undecided(2 * CELLS);
-        goals.decide_tile_sample_goals(&film, &[[16; 2]; 2 * CELLS], 16, 0.01);
+        goals.decide_half_goals(&film, &[[16; 2]; 2 * CELLS], 16, 0.01);
         assert_eq!((goals.get(0, 0), goals.get(CELLS, 0)), (u32::MAX, 16));
     }
 
@@ -333,7 +333,7 @@ pub(crate) mod tests {
                 );
                 done[0][half] += samples;
             }
-            goals.decide_tile_sample_goals(&film, &done, target, 0.6);
+            goals.decide_half_goals(&film, &done, target, 0.6);
         }
         film.mean_luminance().expect("samples")
     }

@@ -34,7 +34,7 @@ const PREVIEW_SHARE: u32 = 10;
 
 /// Inputs of the render stage.
 pub(crate) struct RenderStageInputs<'a> {
-    pub(crate) film: FilmRequest,
+    pub(crate) film: FilmToRender,
     pub(crate) tracer: Tracer<'a>,
     pub(crate) plan: &'a RenderPlan,
     /// The scene's photons, if the image uses them.
@@ -46,7 +46,7 @@ pub(crate) struct RenderStageInputs<'a> {
 }
 
 /// The film to render.
-pub(crate) struct FilmRequest {
+pub(crate) struct FilmToRender {
     pub(crate) key: Fingerprint,
     /// Share of the image to render, or `None` for the whole image.
     pub(crate) share: Option<Shard>,

@@ -18,7 +18,7 @@ use crate::settings::{CheckpointSettings, ResumeMode};
 use crate::sink::EventSink;
 use crate::stages::write::image_encoding_settings;
 
-/// The scene's own image for one version of the scene.
+/// The inputs of the scene's own image, for one version of the scene.
 pub(super) struct SavedSceneImageInputs {
     /// Key of the film.
     pub(super) film: Fingerprint,
@@ -75,7 +75,7 @@ pub(super) struct SceneImage {
     /// Whether the film may be dropped while other images are rendered.
     pub(super) is_film_expendable: bool,
     /// Lock on the checkpoint file, and the checkpoints already reported.
-    checkpoint_lock: RefCell<ProcessCheckpointState>,
+    checkpoint_state: RefCell<ProcessCheckpointState>,
 }
 
 impl SceneImage {
@@ -107,7 +107,7 @@ impl SceneImage {
     ) -> Option<Checkpointer<'a>> {
         let own = self.current.as_ref().filter(|own| film == own.film && uses_checkpoints(&own.plan))?;
         let (output, finish) = (own.plan.outputs.images.first()?, image_encoding_settings(&own.plan));
-        let lock = &self.checkpoint_lock;
+        let lock = &self.checkpoint_state;
         let around = CheckpointContext { finish, dependencies: own.dependencies(), inputs, sink, lock };
         Some(Checkpointer::new(output, own.plan.checkpoints, around))
     }

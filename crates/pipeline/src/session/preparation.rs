@@ -1,4 +1,5 @@
-//! Prepares the scene of a request, and checks in between whether its image fits in memory and may be written.
+//! Prepares the scene of a request, and checks in between whether its image fits in memory and may be
+//! written.
 
 use std::sync::Arc;
 
@@ -98,9 +99,9 @@ impl Session {
     }
 
     /// Checks whether a request fits in memory, and limits the cached films to the remaining memory. If the
-    /// request shows another image, the film of the scene's own image also counts. If the two films do not fit
-    /// together, the film of the scene's own image may be dropped, but only if that image has been written.
-    /// Returns the number of bytes left.
+    /// request shows another image, the film of the scene's own image also counts. If the two films do not
+    /// fit together, the film of the scene's own image may be dropped, but only if that image has been
+    /// written. Returns the number of bytes left.
     ///
     /// # Errors
     /// The request needs more memory than is available.
@@ -110,7 +111,7 @@ impl Session {
         request: &Request,
         plans: &ShownAndScenePlans,
     ) -> Result<u64, AbortReason> {
-        let bytes = self.separate_own_film_bytes(request, plans);
+        let bytes = self.extra_scene_film_bytes(request, plans);
         let all = estimate.clone().with_saved_scene_film(bytes).check(&plans.shown);
         let is_expendable = all.is_err() && self.is_scene_image_written();
         self.own.is_film_expendable = is_expendable;
@@ -123,7 +124,7 @@ impl Session {
     }
 
     /// Returns the size of the own image's film in bytes if it is kept in addition to the request's film.
-    fn separate_own_film_bytes(&self, request: &Request, plans: &ShownAndScenePlans) -> u64 {
+    fn extra_scene_film_bytes(&self, request: &Request, plans: &ShownAndScenePlans) -> u64 {
         let (Some(own), Some(own_plan)) = (&self.own.current, &plans.own) else { return 0 };
         let of = |plan: &RenderPlan| keys::film_sums_key(own.film, &plan.settings, plan.crop);
         let is_shared = of(&plans.shown) == of(own_plan)

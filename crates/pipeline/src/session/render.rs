@@ -14,7 +14,7 @@ use crate::queries::QueryContext;
 use crate::render::coarse_image::CoarseImageRenderer;
 use crate::render::commands::PendingCommandRunner;
 use crate::render::preview::PreviewSender;
-use crate::render::scheduler::{FilmRequest, PreviewOptions, RenderStageInputs};
+use crate::render::scheduler::{FilmToRender, PreviewOptions, RenderStageInputs};
 use crate::render::share::Shard;
 use crate::scene::fingerprint::Fingerprint;
 use crate::stages::photons::{PhotonContext, PhotonStore, SkipReuseOrTracePhotons, trace_first_photons};
@@ -25,7 +25,7 @@ use crate::stopwatch::PausableStopwatch;
 use crate::table::StageRecorder;
 use crate::trace::{TileKernel, Tracer};
 
-/// The image of a request.
+/// The inputs of the image of a request.
 pub(super) struct RequestImageInputs {
     pub(super) scene: ReadyScene,
     /// Key of the film.
@@ -122,7 +122,7 @@ impl Session {
             .then(|| self.own.checkpointer(image.film, inputs, sink))
             .flatten();
         let rendering = RenderStageInputs {
-            film: FilmRequest {
+            film: FilmToRender {
                 key: image.film,
                 share: image.share.clone(),
                 force: request.force,

@@ -54,7 +54,7 @@ impl Session {
         let before = self.current_image_key_and_view();
         let outcome = self.run_stages(context, &mut findings);
         if let Err(AbortReason::Failed(Failure::Scene(diagnostics))) = &outcome {
-            findings.watch_underlined_files(diagnostics, &request.scene, &self.contents, context.token);
+            findings.watch_files_named_in_errors(diagnostics, &request.scene, &self.contents, context.token);
         }
         if let (Ok(report), Some(current)) = (&outcome, &mut self.current) {
             current.report = Some(report.clone());

@@ -13,7 +13,7 @@ use crate::control::{CancelToken, Progress, ignore_progress};
 /// Slot for a glTF file, which is filled by its first user.
 type GltfFileSlot = Arc<Mutex<Option<Arc<GltfFile>>>>;
 
-/// Open glTF files and preloaded meshes.
+/// Open glTF files, preloaded meshes, and files that an importer has generated.
 #[derive(Debug, Default)]
 pub(crate) struct OpenAssetFiles {
     gltf: Mutex<HashMap<PathBuf, GltfFileSlot>>,

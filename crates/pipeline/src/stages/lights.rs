@@ -41,7 +41,7 @@ pub(crate) fn collect_lights(
         scene,
         of,
         geometry.coordinate_origin(),
-        geometry.coplanar_light_offsets(),
+        geometry.light_lifts_by_object(),
         map,
         &patterns,
     );

@@ -193,7 +193,7 @@ impl Findings {
 
     /// Watches files whose absence may have caused an error. Treats the text underlined by each error as a
     /// file name.
-    pub(super) fn watch_underlined_files(
+    pub(super) fn watch_files_named_in_errors(
         &mut self,
         diagnostics: &[Diagnostic],
         scene: &Path,

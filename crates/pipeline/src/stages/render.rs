@@ -11,7 +11,7 @@ use crate::integrators::RayCounters;
 use crate::protocol::reasons;
 use crate::render::film_cache::FilmCache;
 use crate::render::film_state::FilmState;
-use crate::render::scheduler::{FilmRequest, RenderStageInputs, Scheduler};
+use crate::render::scheduler::{FilmToRender, RenderStageInputs, Scheduler};
 use crate::scene::description::RenderOptions;
 
 /// Renders the requested film until it has the requested number of samples or reaches the noise target.
@@ -23,7 +23,7 @@ pub(crate) fn render(
     rendering: &RenderStageInputs<'_>,
 ) -> Result<StageResult<RayCounters>, AbortReason> {
     let RenderOptions { samples: wanted, error, .. } = rendering.plan.settings.render;
-    let FilmRequest { key, ref share, force, max_bytes } = rendering.film;
+    let FilmToRender { key, ref share, force, max_bytes } = rendering.film;
     let is_other_image = films.current().is_some_and(|current| current.key != key);
     films.switch_to_cached(key, |kept| !force && kept.has_at_most_samples(wanted));
     if films.current().is_none() {

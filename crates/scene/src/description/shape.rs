@@ -266,7 +266,8 @@ impl Shape {
         }
     }
 
-    /// Returns the transform of a mesh, or the matrix of another shape. Without a matrix, returns the identity.
+    /// Returns the transform of a mesh, or the matrix of another shape. Without a matrix, returns the
+    /// identity.
     pub fn transform(&self) -> ObjectTransform {
         match self {
             Self::Mesh(mesh) => mesh.placed,

@@ -15,8 +15,8 @@ use crate::math::{Vec2, Vec3};
 pub struct Texture {
     /// Name of the texture in the scene file.
     pub name: String,
-    /// Interpolation between texels. [`TextureFilter::Mipmap`] also averages patterns over the footprint; other
-    /// filters evaluate patterns at a point.
+    /// Interpolation between texels. [`TextureFilter::Mipmap`] also averages patterns over the footprint;
+    /// other filters evaluate patterns at a point.
     pub filter: TextureFilter,
     /// Scale factor for linear colors and numbers. Normals and heights ignore it.
     pub factor: Vec3,

@@ -222,8 +222,8 @@ impl DefinedGroups {
         self.list.as_deref().unwrap_or_default()
     }
 
-    /// Returns the number of objects and nested instances that instances add to the scene. Reports an error if
-    /// there are too many.
+    /// Returns the number of objects and nested instances that instances add to the scene. Reports an error
+    /// if there are too many.
     pub(super) fn count_objects_from_instances(
         &self,
         context: &FileContext<'_>,

@@ -138,7 +138,8 @@ pub(super) fn referenced_files(document: &Document<'_>, path: &Path) -> Vec<Path
     names.into_iter().map(|name| folder.join(name)).collect()
 }
 
-/// Reads the whole scene. Textures, materials and groups are read before the tables that refer to them by name.
+/// Reads the whole scene. Textures, materials and groups are read before the tables that refer to them by
+/// name.
 fn read_scene(root: &TableReader<'_>) -> Option<Scene> {
     let (render, output) = render::read_render_table(root);
     let camera = camera::read_camera(root);

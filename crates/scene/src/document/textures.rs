@@ -97,11 +97,11 @@ pub(crate) static TEXTURES: TableInfo = TableInfo {
         TableSyntax::Named,
         "A texture, which materials use as `{ texture = \"NAME\" }`",
         keys! {
-            /// Interpolation; `"mipmap"` also avoids flicker in the distance by choosing the mip level from the
-            /// pixel footprint, or by averaging the pattern over it.
+            /// Interpolation; `"mipmap"` also avoids flicker in the distance by choosing the mip level from
+            /// the pixel footprint, or by averaging the pattern over it.
             filter: Words(choice_values::<TextureFilter>), Is("\"bilinear\"");
-            /// Scale factor for linear colors; numbers use the red component, and normal maps and heights ignore
-            /// the factor.
+            /// Scale factor for linear colors; numbers use the red component, and normal maps and heights
+            /// ignore the factor.
             factor: COLOR, Is("[1, 1, 1]");
         },
     )

@@ -1,7 +1,7 @@
 //! The vocabulary of scene key definitions: names, types, units, ranges, defaults and descriptions.
 //!
-//! Each table is defined once, next to its reader in `document/`. The reader takes ranges and defaults from the
-//! definition, and the schema, `glimt explain` and completions are generated from it. A test compares the
+//! Each table is defined once, next to its reader in `document/`. The reader takes ranges and defaults from
+//! the definition, and the schema, `glimt explain` and completions are generated from it. A test compares the
 //! documentation with the definitions.
 
 pub(crate) mod colors;

@@ -129,7 +129,7 @@ impl SceneDocumentBuilder {
     }
 
     /// The files that exist only in memory, by name.
-    pub fn in_memory_files(&self) -> &Arc<BTreeMap<String, InMemoryFile>> {
+    pub fn added_in_memory_files(&self) -> &Arc<BTreeMap<String, InMemoryFile>> {
         &self.generated
     }
 

@@ -180,12 +180,12 @@ impl<'s> Document<'s> {
 
     pub(super) fn add_table(&mut self, origin: TableOrigin) -> TableId {
         self.tables.push(TableRecord { first: NONE, last: NONE, length: 0, origin });
-        TableId(u32_index_or_none(self.tables.len() - 1))
+        TableId(u32_index_or_sentinel(self.tables.len() - 1))
     }
 
     /// ID of the table that is added next.
     pub(super) fn next_table_id(&self) -> TableId {
-        TableId(u32_index_or_none(self.tables.len()))
+        TableId(u32_index_or_sentinel(self.tables.len()))
     }
 
     pub(super) fn table_origin(&self, table: TableId) -> TableOrigin {
@@ -201,13 +201,13 @@ impl<'s> Document<'s> {
         let start = self.elements.len();
         self.elements.extend_from_slice(elements);
         self.arrays.push(Span::new(start, self.elements.len()));
-        NodeKind::Array(u32_index_or_none(self.arrays.len() - 1))
+        NodeKind::Array(u32_index_or_sentinel(self.arrays.len() - 1))
     }
 
     /// Adds an empty list of tables.
     pub(super) fn add_table_list(&mut self) -> NodeKind {
         self.lists.push(Vec::new());
-        NodeKind::List(u32_index_or_none(self.lists.len() - 1))
+        NodeKind::List(u32_index_or_sentinel(self.lists.len() - 1))
     }
 
     pub(super) fn table_list_mut(&mut self, list: u32) -> &mut Vec<ValueNode> {
@@ -224,13 +224,13 @@ impl<'s> Document<'s> {
             return DecodedTextIndex::QUOTED;
         }
         self.texts.push(text);
-        DecodedTextIndex(u32_index_or_none(self.texts.len() - 1))
+        DecodedTextIndex(u32_index_or_sentinel(self.texts.len() - 1))
     }
 
     /// Adds a number that is not in the source.
     pub(super) fn add_number(&mut self, number: f64) -> NodeKind {
         self.numbers.push(number);
-        NodeKind::Number(u32_index_or_none(self.numbers.len() - 1))
+        NodeKind::Number(u32_index_or_sentinel(self.numbers.len() - 1))
     }
 
     fn resolve_string(&self, span: Span, text: DecodedTextIndex) -> &str {
@@ -244,7 +244,7 @@ impl<'s> Document<'s> {
 
     /// Appends an entry to a table that does not contain its key.
     pub(super) fn add_entry(&mut self, table: TableId, name: Name<'s>, node: ValueNode) {
-        let entry = u32_index_or_none(self.entries.len());
+        let entry = u32_index_or_sentinel(self.entries.len());
         let text = self.store_decoded_string(name.span, name.text.clone());
         self.entries.push(TableEntry { key: name.span, text, node, next: NONE, is_removed: false });
         let TableRecord { first, last, length, .. } = &mut self.tables[table.0 as usize];
@@ -404,6 +404,6 @@ impl<'s> Document<'s> {
     }
 }
 
-fn u32_index_or_none(index: usize) -> u32 {
+fn u32_index_or_sentinel(index: usize) -> u32 {
     u32::try_from(index).unwrap_or(NONE)
 }

@@ -6,7 +6,7 @@ use crate::control::Canceled;
 use crate::geometry::{Aabb, Ray};
 use crate::math::Vec3;
 use crate::math::elementary::exp2;
-use crate::world::{NodeBoundsAndDepth, PixelFootprint, RayBoxInterval};
+use crate::world::{PixelFootprint, RayBoxInterval, VisitedNode};
 
 /// Line width in pixels.
 const LINE_WIDTH: f32 = 1.25;
@@ -64,29 +64,26 @@ fn find_edge_to_draw(
     footprint: PixelFootprint,
 ) -> Option<NearbyBoxEdge> {
     let mut best: Option<NearbyBoxEdge> = None;
-    tile.world.geometry.visit_nodes_along_ray(
-        ray,
-        |local, NodeBoundsAndDepth { bounds, depth, .. }, stretch| {
-            let unit = local.direction.length();
-            let pixel = |t: f32| (footprint.width + t * footprint.spread) * unit;
-            let RayBoxInterval { enter, leave } = *stretch;
-            let size = bounds.extent().length();
-            if size < MIN_BOX_SIZE * pixel(enter.0.max(0.0)) {
-                return false;
+    tile.world.geometry.visit_nodes_hit_by_ray(ray, |local, VisitedNode { bounds, depth, .. }, stretch| {
+        let unit = local.direction.length();
+        let pixel = |t: f32| (footprint.width + t * footprint.spread) * unit;
+        let RayBoxInterval { enter, leave } = *stretch;
+        let size = bounds.extent().length();
+        if size < MIN_BOX_SIZE * pixel(enter.0.max(0.0)) {
+            return false;
+        }
+        for (t, side) in [enter, leave].into_iter().filter(|(t, _)| *t > 0.0) {
+            let line = NearbyBoxEdge { is_behind: t > end, depth: *depth };
+            let is_first =
+                best.is_none_or(|best| (line.is_behind, line.depth) < (best.is_behind, best.depth));
+            if is_first
+                && distance_from_ray_to_face_edge(bounds, local, (t, side)) < 0.5 * LINE_WIDTH * pixel(t)
+            {
+                best = Some(line);
             }
-            for (t, side) in [enter, leave].into_iter().filter(|(t, _)| *t > 0.0) {
-                let line = NearbyBoxEdge { is_behind: t > end, depth: *depth };
-                let is_first =
-                    best.is_none_or(|best| (line.is_behind, line.depth) < (best.is_behind, best.depth));
-                if is_first
-                    && distance_from_ray_to_face_edge(bounds, local, (t, side)) < 0.5 * LINE_WIDTH * pixel(t)
-                {
-                    best = Some(line);
-                }
-            }
-            true
-        },
-    );
+        }
+        true
+    });
     best
 }
 

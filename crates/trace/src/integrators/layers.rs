@@ -106,8 +106,8 @@ pub struct SampleBatchLayerValues {
     values: Vec<f32>,
     /// Index of each layer's first component among the values of a sample, for layers in the set.
     places: [Option<usize>; SampleLayer::ALL.len()],
-    /// The tile's most recent results of [`SampleBatchLayerValues::cached_constant_albedo`], by material index
-    /// modulo the array length.
+    /// The tile's most recent results of [`SampleBatchLayerValues::cached_constant_albedo`], by material
+    /// index modulo the array length.
     albedos: [Option<(usize, Option<Vec3>)>; 16],
 }
 
@@ -156,7 +156,8 @@ impl SampleBatchLayerValues {
         }
     }
 
-    /// Adds the albedo, normal and depth at the first hit to a sample. Ignores layers that are not in the set.
+    /// Adds the albedo, normal and depth at the first hit to a sample. Ignores layers that are not in the
+    /// set.
     #[inline]
     pub fn add_first_hit(&mut self, slot: u32, values: [Vec3; 3]) {
         // If the set contains all three, they come first.

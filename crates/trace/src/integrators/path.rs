@@ -81,7 +81,7 @@ pub fn trace_camera_paths(
         }
     }
     paths.shade_queued_vertices()?;
-    paths.direct.accumulate_in_consecutive_slots(slots.start, &mut paths.accumulator);
+    paths.direct.accumulate_arrived_light_in_slots(slots.start, &mut paths.accumulator);
     paths.advance_to_next_bounce(rays);
     // Trace the remaining bounces.
     while !rays.is_empty() {

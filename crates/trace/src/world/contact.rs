@@ -117,8 +117,8 @@ impl World {
         self.visit_coincident_surfaces(at, (memory, error), visit)
     }
 
-    /// Collects surfaces that may coincide with the hit point or enclose it, and returns their error bound per
-    /// axis.
+    /// Collects surfaces that may coincide with the hit point or enclose it, and returns their error bound
+    /// per axis.
     pub fn collect_surfaces_near_hit(
         &self,
         at: &CoincidenceQuery<'_>,

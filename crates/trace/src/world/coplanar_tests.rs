@@ -310,7 +310,7 @@ fn lifted_lights_are_hit_only_from_the_front() {
             let scene = scene_from_toml(&tables);
             for accel in [Accel::Bvh, Accel::KdTree] {
                 let geometry = build_geometry(&scene, accel);
-                assert_eq!(geometry.coplanar_light_offsets().len(), 2);
+                assert_eq!(geometry.light_lifts_by_object().len(), 2);
                 for _ in 0..50 {
                     let target = Vec3::new(next() * 0.1, 0.0, next() * 0.1);
                     let from = Vec3::new(next() * 8.0, 0.5 + next().abs() * 9.0, next() * 8.0);
@@ -328,7 +328,7 @@ fn lifted_lights_are_hit_only_from_the_front() {
                     let hit = geometry.closest_hit(&Ray::new(below, target - below)).expect("a hit");
                     assert!(is_closed || hit.object != number, "{tables} {below}");
                     // Light samples are occluded from the same positions as hits.
-                    let lift = geometry.coplanar_light_offsets()[number as usize].as_vec3();
+                    let lift = geometry.light_lifts_by_object()[number as usize].as_vec3();
                     let hidden = Ray::segment_ending_before_point(below, target + lift);
                     assert!(
                         geometry.is_occluded_except_by_light(&hidden, GeometryOfLight::Object(number)),
@@ -351,7 +351,7 @@ fn packets_match_single_rays_at_lifted_lights() {
             let loaded = LoadedMesh { mesh: mesh.clone(), ..LoadedMesh::default() };
             let geometry = build_geometry_with_mesh(&scene_from_toml(&tables), accel, loaded)
                 .with_instruction_set(instructions);
-            assert!(!geometry.coplanar_light_offsets().is_empty());
+            assert!(!geometry.light_lifts_by_object().is_empty());
             assert_packets_match_rays(&geometry);
         }
     }
@@ -373,7 +373,7 @@ fn lights_in_tilted_and_distant_planes_are_lifted() {
         };
         let tables = format!("{}{}", quad(3.0, "w"), quad(1.0, "l"));
         let geometry = build_geometry(&scene_from_toml(&tables), Accel::Bvh);
-        assert_eq!(geometry.coplanar_light_offsets().len(), 2, "{tables}");
+        assert_eq!(geometry.light_lifts_by_object().len(), 2, "{tables}");
         for _ in 0..50 {
             let target = center + (x * vector().x + y * vector().x) * 0.9;
             let from = target + x.cross(y) * (2.0 + f64::from(round)) + vector() * 2.0;

@@ -18,8 +18,8 @@ use crate::lights::infinite::{
 };
 use crate::lights::{
     AreaLight, BlendPartWeight, BoundingSphere, EmissionModulation, EmissionTerm, Light, LightBounds, Lights,
-    PhotonEmitter, Side, TriangleWithUvs, UvMapping, create_see_through_side_light, new_back_area_light,
-    new_front_area_light,
+    PhotonEmitter, Side, TriangleWithUvs, UvMapping, new_back_area_light, new_front_area_light,
+    new_see_through_side_light,
 };
 use crate::lights::{Emitter, EmittingPart};
 use crate::materials::texels::Texels;
@@ -227,8 +227,8 @@ fn scale_light_bounds_by_term_means(bounds: LightBounds, terms: &[EmissionTerm])
     }
 }
 
-/// Creates the lights for an emitting shape, one per emitting side. `frame` maps the shape's own coordinates to
-/// world coordinates.
+/// Creates the lights for an emitting shape, one per emitting side. `frame` maps the shape's own coordinates
+/// to world coordinates.
 fn area_lights_of_shape(
     shape: &Shape,
     emissive: &SurfaceEmission,
@@ -238,7 +238,7 @@ fn area_lights_of_shape(
     let of_side = move |side: &Side| {
         let (radiance, terms) = emissive.radiance_and_terms(*side);
         let light = match (emissive.is_sheer, side) {
-            (true, side) => create_see_through_side_light(shape, *side, radiance, object)?,
+            (true, side) => new_see_through_side_light(shape, *side, radiance, object)?,
             (false, Side::Front) => new_front_area_light(shape, radiance, object)?,
             (false, Side::Back) => new_back_area_light(shape, radiance, object)?,
         };

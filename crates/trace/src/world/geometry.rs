@@ -86,7 +86,7 @@ impl Geometry {
     }
 
     /// One translation per object, or empty if no objects are moved; see [`super::find_coplanar_lights`].
-    pub fn coplanar_light_offsets(&self) -> &[DVec3] {
+    pub fn light_lifts_by_object(&self) -> &[DVec3] {
         &self.lifts
     }
 

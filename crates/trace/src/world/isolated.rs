@@ -70,7 +70,7 @@ impl ObjectRegionIsolationStates {
     }
 
     /// Creates a table with one state per grid cell of a shape's bounding box.
-    fn empty_for_grid_cells(margin: f32, bounds: &Aabb) -> Self {
+    fn unknown_for_grid_cells(margin: f32, bounds: &Aabb) -> Self {
         let dense = Vec3::splat(CELLS as f32) / bounds.extent();
         // A flat box is one cell thick.
         let dense = Vec3::from(dense.to_array().map(|dense| if dense.is_finite() { dense } else { 0.0 }));
@@ -99,7 +99,7 @@ impl ObjectRegionIsolationStates {
     }
 }
 
-/// A surface region to test for isolation.
+/// A patch of a surface to test for isolation.
 enum SurfacePatch {
     /// A grid cell, expanded by the margin.
     GridCell(Aabb),
@@ -117,7 +117,7 @@ impl Geometry {
     pub fn is_hit_isolated(&self, hit: &Hit, surface: &SurfacePoint, margin: Vec3) -> bool {
         let object = &self.objects()[hit.object as usize];
         let table = self.isolated_region_cache().tables[hit.object as usize]
-            .get_or_init(|| self.new_neighbor_free_region_table(object));
+            .get_or_init(|| self.new_region_isolation_table(object));
         if !(margin.max_element() <= table.margin) {
             return false;
         }
@@ -146,7 +146,7 @@ impl Geometry {
 
     /// Creates an object's table. The margin covers rays from up to four scene sizes away. Longer rays have
     /// larger margins and do not use the table.
-    fn new_neighbor_free_region_table(&self, object: &Object) -> ObjectRegionIsolationStates {
+    fn new_region_isolation_table(&self, object: &Object) -> ObjectRegionIsolationStates {
         let of_rays =
             self.max_mesh_rounding_error() + 8.0 * f32::EPSILON * self.isolated_region_cache().reach;
         match object {
@@ -161,7 +161,7 @@ impl Geometry {
             Object::Shape(shape) => match shape.bounds() {
                 Some(bounds) => {
                     let size = bounds.min.abs().max(bounds.max.abs()).max_element();
-                    ObjectRegionIsolationStates::empty_for_grid_cells(
+                    ObjectRegionIsolationStates::unknown_for_grid_cells(
                         of_rays.max(64.0 * f32::EPSILON * size),
                         &bounds,
                     )

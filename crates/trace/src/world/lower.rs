@@ -1,4 +1,5 @@
-//! Converts the materials of scene files into renderable materials. `file_materials` converts those of mesh files.
+//! Converts the materials of scene files into renderable materials. `file_materials` converts those of mesh
+//! files.
 
 use std::sync::Arc;
 

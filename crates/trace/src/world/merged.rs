@@ -2,7 +2,7 @@
 //! there are few triangles in total, packets test them using a [`BruteForceTriangles`] without a tree.
 //!
 //! Triangles are transformed to world coordinates and rounded. [`contact`](super::contact) and
-//! [`Geometry::visit_nodes_along_ray`](super::Geometry::visit_nodes_along_ray) use the per-mesh trees. Hits
+//! [`Geometry::visit_nodes_hit_by_ray`](super::Geometry::visit_nodes_hit_by_ray) use the per-mesh trees. Hits
 //! on untransformed instances are bit-identical to hits on unmerged meshes.
 
 mod packets;

@@ -44,7 +44,7 @@ impl MeshInstance {
 
     /// Transforms a ray to mesh coordinates without changing t.
     pub(super) fn local_ray(&self, ray: &Ray) -> Ray {
-        let start = self.mesh_number_of_scene_triangle(ray.start);
+        let start = self.triangle_number_in_mesh(ray.start);
         if self.is_transformed {
             self.transform_ray_to_mesh(ray).with_start_triangle(start)
         } else {
@@ -78,7 +78,7 @@ impl MeshInstance {
     /// Converts a scene-wide triangle number to this mesh's numbering. For another mesh's triangle, the
     /// result is out of range.
     #[inline(always)]
-    pub(super) fn mesh_number_of_scene_triangle(&self, in_scene: u32) -> u32 {
+    pub(super) fn triangle_number_in_mesh(&self, in_scene: u32) -> u32 {
         self.first.map_or(Ray::NO_TRIANGLE, |first| in_scene.wrapping_sub(first))
     }
 
@@ -325,7 +325,7 @@ impl MeshInstance {
     fn local_rays(&self, rows: &RayPacket, active: u32) -> [Ray; PACKET_SIZE] {
         let local = |lane: usize| {
             let ray = rows.ray(lane % PACKET_SIZE);
-            let ray = ray.with_start_triangle(self.mesh_number_of_scene_triangle(ray.start));
+            let ray = ray.with_start_triangle(self.triangle_number_in_mesh(ray.start));
             if self.is_transformed { self.transform_ray_to_mesh(&ray) } else { ray }
         };
         let mut rays = [local(active.trailing_zeros() as usize); PACKET_SIZE];

@@ -33,7 +33,7 @@ mod unlit_glass;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-pub use crate::accel::{InstructionSet, NodeBoundsAndDepth, PACKET_SIZE, RayBoxInterval, SimdKernel};
+pub use crate::accel::{InstructionSet, PACKET_SIZE, RayBoxInterval, SimdKernel, VisitedNode};
 pub use camera::{Camera, FilmPosition, FilmPositionPacket, PixelFootprint};
 pub use camera_interior::CompoundSolid;
 pub use contact::{

@@ -11,7 +11,7 @@ use crate::accel::{AnyHitCallback, F32x16};
 use crate::geometry::packet::{RayPacket, set_bit_lanes};
 use crate::geometry::ray::offset_origin;
 use crate::geometry::{Ray, SurfaceRequest};
-use crate::lights::{EmitterObjectPacket, GeometryOfLight};
+use crate::lights::{GeometryOfLight, GeometryOfLightPacket};
 use crate::materials::{Footprint, Material};
 use crate::math::Vec3;
 use crate::math::lanes::{Simd, Vec3x16, set_lane};
@@ -87,7 +87,7 @@ impl World {
         rows: &RayPacket,
         ends: &F32x16,
         traced: u32,
-        sources: &EmitterObjectPacket,
+        sources: &GeometryOfLightPacket,
     ) -> ShadowTransmittancePacket {
         self.geometry.instruction_set().run(ShadowTransmittanceKernel {
             world: self,
@@ -178,7 +178,7 @@ struct ShadowTransmittanceKernel<'a> {
     rows: &'a RayPacket,
     ends: &'a F32x16,
     traced: u32,
-    sources: &'a EmitterObjectPacket,
+    sources: &'a GeometryOfLightPacket,
 }
 
 impl SimdKernel for ShadowTransmittanceKernel<'_> {

@@ -5,7 +5,7 @@ use super::{Geometry, Hit};
 use crate::accel::{AnyHitCallback, ClosestHitCallback, F32x16, PACKET_SIZE, SimdKernel};
 use crate::geometry::Ray;
 use crate::geometry::packet::{HitPacket, RayPacket, nonnegative_end_mask, set_bit_lanes};
-use crate::lights::{EmitterObjectPacket, GeometryOfLight};
+use crate::lights::{GeometryOfLight, GeometryOfLightPacket};
 use crate::math::lanes::{Simd, TRUE, select, select_u32};
 
 impl Geometry {
@@ -48,7 +48,7 @@ impl Geometry {
         rows: &RayPacket,
         ends: &F32x16,
         traced: u32,
-        sources: &EmitterObjectPacket,
+        sources: &GeometryOfLightPacket,
         simd: impl Simd,
     ) -> u32 {
         simd.call_out_of_line(OcclusionKernel { geometry: self, rows, ends, traced, sources })
@@ -58,12 +58,12 @@ impl Geometry {
 impl Geometry {
     /// Mask of rays whose light is an entire merged mesh.
     #[inline(always)]
-    pub(super) fn light_is_entire_merged_mesh_mask(&self, sources: &EmitterObjectPacket) -> u32 {
+    pub(super) fn light_is_entire_merged_mesh_mask(&self, sources: &GeometryOfLightPacket) -> u32 {
         if !sources.is_any || !self.has_merged_meshes() {
             return 0;
         }
         let is_whole = |lane: usize| {
-            sources.part[lane] == EmitterObjectPacket::NONE
+            sources.part[lane] == GeometryOfLightPacket::NONE
                 && self.is_light_entire_merged_mesh(GeometryOfLight::Object(sources.object[lane]))
         };
         (0..PACKET_SIZE).filter(|&lane| is_whole(lane)).fold(0, |bits, lane| bits | 1 << lane)
@@ -96,7 +96,7 @@ impl Geometry {
         rows: &RayPacket,
         ends: &F32x16,
         traced: u32,
-        sources: &EmitterObjectPacket,
+        sources: &GeometryOfLightPacket,
     ) -> u32 {
         let is_occluded = |&lane: &usize| {
             self.is_occluded_except_by_light(
@@ -114,7 +114,7 @@ struct OcclusionKernel<'a> {
     rows: &'a RayPacket,
     ends: &'a F32x16,
     traced: u32,
-    sources: &'a EmitterObjectPacket,
+    sources: &'a GeometryOfLightPacket,
 }
 
 impl SimdKernel for OcclusionKernel<'_> {
@@ -214,7 +214,7 @@ fn resolve_merged_hits(merged: &MergedMeshes, found: &mut HitPacket) -> [u32; PA
 pub(super) struct OcclusionTest<'a, F> {
     geometry: &'a Geometry,
     rows: &'a RayPacket,
-    sources: &'a EmitterObjectPacket,
+    sources: &'a GeometryOfLightPacket,
     /// Mask of rays whose light is a single primitive of an object.
     in_part: u32,
     simd: F,
@@ -226,7 +226,7 @@ impl<'a, F: Simd> OcclusionTest<'a, F> {
     pub(super) fn new(
         geometry: &'a Geometry,
         rows: &'a RayPacket,
-        sources: &'a EmitterObjectPacket,
+        sources: &'a GeometryOfLightPacket,
         simd: F,
     ) -> Self {
         Self { geometry, rows, sources, in_part: light_is_single_primitive_mask(sources, simd), simd }
@@ -272,20 +272,20 @@ impl<F: Simd> AnyHitCallback for OcclusionTest<'_, F> {
 
 /// Mask of rays whose light is a single primitive of an object.
 #[inline(always)]
-fn light_is_single_primitive_mask(sources: &EmitterObjectPacket, simd: impl Simd) -> u32 {
+fn light_is_single_primitive_mask(sources: &GeometryOfLightPacket, simd: impl Simd) -> u32 {
     if !sources.is_any {
         return 0;
     }
     let mut in_part = [0; PACKET_SIZE];
     for lane in 0..PACKET_SIZE {
-        in_part[lane] = if sources.part[lane] == EmitterObjectPacket::NONE { 0 } else { TRUE };
+        in_part[lane] = if sources.part[lane] == GeometryOfLightPacket::NONE { 0 } else { TRUE };
     }
     simd.movemask(&in_part)
 }
 
 /// Mask of rays whose light is on object `id`.
 #[inline(always)]
-fn light_is_on_object_mask(sources: &EmitterObjectPacket, id: u32, simd: impl Simd) -> u32 {
+fn light_is_on_object_mask(sources: &GeometryOfLightPacket, id: u32, simd: impl Simd) -> u32 {
     if !sources.is_any {
         return 0;
     }
@@ -381,7 +381,7 @@ pub(super) mod tests {
     struct OccludedRayPacketKernel<'a> {
         geometry: &'a Geometry,
         rays: &'a [Ray],
-        sources: &'a EmitterObjectPacket,
+        sources: &'a GeometryOfLightPacket,
     }
 
     impl SimdKernel for OccludedRayPacketKernel<'_> {
@@ -428,7 +428,7 @@ pub(super) mod tests {
                 _ => GeometryOfLight::Object(u32::MAX),
             };
             let sources: Vec<_> = (0..rays.len()).map(source).collect();
-            let mut row = EmitterObjectPacket::splat(GeometryOfLight::Nothing);
+            let mut row = GeometryOfLightPacket::splat(GeometryOfLight::Nothing);
             sources.iter().enumerate().for_each(|(lane, source)| row.set_geometry(lane, *source));
             let occluded = geometry.instruction_set().run(OccludedRayPacketKernel {
                 geometry,

@@ -1,17 +1,17 @@
 //! Visits the tree nodes intersected by a ray.
 
 use super::{Geometry, Object};
-use crate::accel::{NodeBoundsAndDepth, RayBoxInterval};
+use crate::accel::{RayBoxInterval, VisitedNode};
 use crate::geometry::Ray;
 
 impl Geometry {
     /// Visits every node, in any tree, whose box the ray intersects. `visit` receives the ray in the
     /// coordinates of the node's tree, with t unchanged, and returns whether to descend. Depth is counted
     /// across both levels: a mesh's root is one below the leaf that contains the mesh.
-    pub fn visit_nodes_along_ray(
+    pub fn visit_nodes_hit_by_ray(
         &self,
         ray: &Ray,
-        mut visit: impl FnMut(&Ray, &NodeBoundsAndDepth, &RayBoxInterval) -> bool,
+        mut visit: impl FnMut(&Ray, &VisitedNode, &RayBoxInterval) -> bool,
     ) {
         let mut below = Vec::new();
         self.traced_tree().visit_nodes_hit_by_ray(
@@ -28,8 +28,8 @@ impl Geometry {
                 (None, Some(mesh)) => (mesh.local_ray(ray), mesh.tree.triangle_tree()),
                 (None, None) => continue,
             };
-            tree.visit_nodes_along_ray(&local, |cell, stretch| {
-                visit(&local, &NodeBoundsAndDepth { depth: above + cell.depth, ..*cell }, stretch)
+            tree.visit_nodes_hit_by_ray(&local, |cell, stretch| {
+                visit(&local, &VisitedNode { depth: above + cell.depth, ..*cell }, stretch)
             });
         }
     }
@@ -38,7 +38,7 @@ impl Geometry {
     /// leaves, plus the number of infinite objects.
     pub fn ray_traversal_cost(&self, ray: &Ray) -> u32 {
         let mut count = self.unbounded().len() as u32;
-        self.visit_nodes_along_ray(ray, |_, cell, _| {
+        self.visit_nodes_hit_by_ray(ray, |_, cell, _| {
             count += 1 + cell.shapes;
             true
         });

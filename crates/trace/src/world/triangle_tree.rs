@@ -1,7 +1,7 @@
 //! Acceleration structure over triangles: a BVH or a kd-tree, with bit-identical hits.
 
 use crate::accel::wide_bvh::BuildQuality;
-use crate::accel::{F32x16, KdTree, NodeBoundsAndDepth, RayBoxInterval, WideBvh};
+use crate::accel::{F32x16, KdTree, RayBoxInterval, VisitedNode, WideBvh};
 use crate::control::{CancelToken, Canceled};
 use crate::geometry::{Aabb, Ray, ShapeHit};
 use crate::math::Vec3;
@@ -66,14 +66,14 @@ impl TriangleTree {
     }
 
     /// Visits the nodes whose boxes the ray intersects, parents first. `visit` returns whether to descend.
-    pub fn visit_nodes_along_ray(
+    pub fn visit_nodes_hit_by_ray(
         &self,
         ray: &Ray,
-        visit: impl FnMut(&NodeBoundsAndDepth, &RayBoxInterval) -> bool,
+        visit: impl FnMut(&VisitedNode, &RayBoxInterval) -> bool,
     ) {
         match self {
             Self::Boxes(tree) => tree.visit_nodes_hit_by_ray(ray, visit),
-            Self::Planes(tree) => tree.visit_nodes_along_ray(ray, visit),
+            Self::Planes(tree) => tree.visit_nodes_hit_by_ray(ray, visit),
         }
     }
 

@@ -29,7 +29,7 @@ impl TokenBucket {
     }
 
     /// Returns the time at which there will be enough tokens to send `bytes`.
-    pub(super) fn available_at(&self, bytes: usize, now: Instant) -> Instant {
+    pub(super) fn time_when_available(&self, bytes: usize, now: Instant) -> Instant {
         if self.available_tokens(now) >= bytes {
             return now;
         }

@@ -155,7 +155,7 @@ impl TerminalFlowControl {
     }
 
     /// Records that the operating system has accepted bytes.
-    pub(super) fn record_written_bytes(&mut self, bytes: usize) {
+    pub(super) fn record_accepted_bytes(&mut self, bytes: usize) {
         self.unwritten = self.unwritten.saturating_sub(bytes);
     }
 
@@ -181,7 +181,7 @@ impl TerminalFlowControl {
 
     /// Returns the earliest time at which more may be sent if no reply arrives.
     pub(super) fn next_send_time(&self, now: Instant) -> Option<Instant> {
-        let filled = self.bucket.available_at(MIN_SLICE + QUERY_BYTES, now);
+        let filled = self.bucket.time_when_available(MIN_SLICE + QUERY_BYTES, now);
         match self.replies {
             ReplySupport::Answering => {
                 let lost =

@@ -41,7 +41,7 @@ impl SimulatedTerminal {
 
     fn send(&mut self, bytes: usize, question: Option<QueryKind>) {
         self.connection.record_sent(bytes, question, self.now);
-        self.connection.record_written_bytes(bytes);
+        self.connection.record_accepted_bytes(bytes);
         self.busy = self.busy.max(self.now) + Duration::from_secs_f64(bytes as f64 / self.bytes_a_second);
         self.carried += bytes;
         self.longest = self.longest.max(self.busy - self.now);

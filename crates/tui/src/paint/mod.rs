@@ -69,7 +69,7 @@ pub struct Painter {
     aim: u64,
 }
 
-/// A step in drawing the screen.
+/// A layer of a row that has yet to be drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum RowLayerToDraw {
     /// Draw a row's text.

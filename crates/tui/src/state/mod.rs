@@ -129,7 +129,7 @@ impl State {
         has_failed && self.overlays.problems.as_ref().is_none_or(|problems| problems.work.is_none())
     }
 
-    /// Opens the view list, or restarts its timeout if it is already open.
+    /// Opens the list of view modes, or restarts its timeout if it is already open.
     pub(super) fn open_view_mode_list(&mut self) {
         self.overlays.open_or_extend_view_mode_list(self.now);
         self.dirty = true;

@@ -1,4 +1,4 @@
-//! Text over the image: messages, diagnostics, help, and the view list.
+//! Text over the image: messages, diagnostics, help, and the list of view modes.
 
 use std::time::{Duration, Instant};
 
@@ -14,7 +14,7 @@ pub(crate) struct BlockingErrors {
     pub work: Option<String>,
 }
 
-/// The open view list.
+/// The open list of view modes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct ViewModeList {
     /// Time when the list closes automatically.
@@ -65,7 +65,7 @@ impl OverlayState {
             .is_some_and(|problems| problems.diagnostics.iter().any(is_scene_not_found_diagnostic))
     }
 
-    /// Opens the view list, or restarts its timeout if it is already open.
+    /// Opens the list of view modes, or restarts its timeout if it is already open.
     pub(crate) fn open_or_extend_view_mode_list(&mut self, now: Instant) {
         const MOMENT: Duration = Duration::from_secs(4);
         let name = self.views.take().and_then(|views| views.name);

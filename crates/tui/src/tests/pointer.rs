@@ -254,7 +254,7 @@ fn y_copies_if_the_terminal_supports_it() {
     assert!(text.contains(&format!("{} sphere", messages::SELECT_TO_COPY)), "{text}");
     assert!(text.contains("normal (0, 1, 0) · pixel 1, 2"), "{text}");
     ui.state.display.capabilities =
-        TerminalId { brand: TerminalBrand::Kitty, version: [0, 40] }.desktop_integration();
+        TerminalId { brand: TerminalBrand::Kitty, version: [0, 40] }.terminal_extras();
     let effects = ui.press_character('y');
     let words = "sphere \"ball\" · cornell.toml:47 · glass crystal · distance 3.9 · position (0.2, 0.5, -0.3) · \
                  radiance (0.5, 0.5, 0.5) · normal (0, 1, 0) · pixel 1, 2";

@@ -450,7 +450,7 @@ fn written_files_are_hyperlinks() {
 fn notification(seconds: u64, prepare: impl Fn(&mut TestUi)) -> Option<String> {
     let mut ui = TestUi::new();
     ui.state.display.capabilities =
-        TerminalId { brand: TerminalBrand::Kitty, version: [0, 40] }.desktop_integration();
+        TerminalId { brand: TerminalBrand::Kitty, version: [0, 40] }.terminal_extras();
     prepare(&mut ui);
     ui.advance_clock(1000 * seconds);
     let effects = ui.worker_event(done_event(1, Vec::new(), false));

@@ -43,7 +43,7 @@ pub(super) fn handle_mouse(state: &mut State, mouse: MouseEvent) -> Vec<Effect> 
             Some(press) if !press.has_moved => pick_object_at_click(state, mouse),
             Some(_) | None => Vec::new(),
         },
-        MouseEventKind::WheelUp | MouseEventKind::WheelDown if wheel_scrolls_overlay(state, mouse) => {
+        MouseEventKind::WheelUp | MouseEventKind::WheelDown if is_wheel_for_overlay(state, mouse) => {
             let line = if mouse.kind == MouseEventKind::WheelUp {
                 OverlayAction::LineUp
             } else {
@@ -57,7 +57,7 @@ pub(super) fn handle_mouse(state: &mut State, mouse: MouseEvent) -> Vec<Effect> 
     }
 }
 
-fn wheel_scrolls_overlay(state: &State, mouse: MouseEvent) -> bool {
+fn is_wheel_for_overlay(state: &State, mouse: MouseEvent) -> bool {
     let is_on_errors = || Layout::for_state(state).pane.contains((mouse.column, mouse.row).into());
     state.overlays.help.open || state.overlays.diagnostics.open && is_on_errors()
 }

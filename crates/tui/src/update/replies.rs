@@ -115,8 +115,7 @@ fn handle_terminal_name(state: &mut State, terminal: TerminalId) -> Vec<Effect> 
     let ask = state.display.ask;
     let mut effects = Vec::new();
     if ask.name {
-        let had_focus =
-            std::mem::replace(&mut state.display.capabilities, terminal.desktop_integration()).focus;
+        let had_focus = std::mem::replace(&mut state.display.capabilities, terminal.terminal_extras()).focus;
         effects.extend((state.display.capabilities.focus && !had_focus).then_some(Effect::ReportFocus));
         state.dirty = true;
     }
@@ -227,7 +226,7 @@ mod tests {
         state.display.ask = TerminalQueries { name: true, ..TerminalQueries::default() };
         let ghostty = TerminalId { brand: TerminalBrand::Ghostty, version: [1, 2] };
         assert!(matches!(handle_reply(&mut state, TerminalReply::Name(ghostty))[..], [Effect::ReportFocus]));
-        assert_eq!(state.display.capabilities, ghostty.desktop_integration());
+        assert_eq!(state.display.capabilities, ghostty.terminal_extras());
         assert!(
             handle_reply(&mut state, TerminalReply::Name(ghostty)).is_empty(),
             "focus reporting is already enabled"

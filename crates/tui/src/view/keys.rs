@@ -158,7 +158,7 @@ fn urgent_and_other_hints(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
     }
     let mut urgent = Vec::new();
     if let Some(views) = &state.overlays.views {
-        urgent.extend(view_list_hints(views).into_iter().chain(closing()));
+        urgent.extend(view_mode_list_hints(views).into_iter().chain(closing()));
     } else if state.overlays.diagnostics.open {
         let (_, last) = super::diagnostics::page_height_and_max_scroll(state);
         urgent.extend(scrolling(last, &[OverlayAction::LineDown]).into_iter().chain(closing()));
@@ -226,7 +226,7 @@ fn urgent_and_other_hints(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
 }
 
 /// Keys for the view list, or the search text.
-fn view_list_hints(views: &ViewModeList) -> Vec<KeyHint> {
+fn view_mode_list_hints(views: &ViewModeList) -> Vec<KeyHint> {
     match &views.name {
         Some(name) => vec![KeyHint { tone: TextRole::Strong, ..KeyHint::new("/", format!("{name}▏")) }],
         None => [("1-9", "choose"), ("j k", "move"), ("/", "find")]

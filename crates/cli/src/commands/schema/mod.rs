@@ -69,7 +69,7 @@ fn table_schema(info: &'static TableInfo, draft: SchemaDraft) -> Value {
         (false, SchemaDraft::Four) => all_types_table_schema(info),
         (false, SchemaDraft::Latest) => table_schema_with_type_conditions(info),
     };
-    for (name, condition) in key_combinations_for_table(info.name, draft) {
+    for (name, condition) in key_combination_conditions_for_table(info.name, draft) {
         table[name] = condition;
     }
     for inner in (info.tables)() {
@@ -136,7 +136,7 @@ fn table_schema_with_type_conditions(info: &'static TableInfo) -> Value {
                 key_schema(key, draft)
             });
             then["properties"]["type"] = json!(true);
-            for (name, condition) in key_combinations_for_type(kind.name) {
+            for (name, condition) in key_combination_conditions_for_type(kind.name) {
                 then[name] = condition;
             }
             json!({ "if": type_condition(info, kind), "then": then })
@@ -230,7 +230,7 @@ fn key_type_restriction_schema(
 }
 
 /// Returns conditions on combinations of keys in a table.
-fn key_combinations_for_table(table: &str, draft: SchemaDraft) -> Vec<(&'static str, Value)> {
+fn key_combination_conditions_for_table(table: &str, draft: SchemaDraft) -> Vec<(&'static str, Value)> {
     let none_of = |names: &[&str]| {
         let each: Vec<Value> = names.iter().map(|name| json!({ "required": [name] })).collect();
         json!({ "not": { "anyOf": each } })
@@ -253,7 +253,7 @@ fn key_combinations_for_table(table: &str, draft: SchemaDraft) -> Vec<(&'static 
                 json!({ "not": { "properties": { "type": { "enum": ["metal"] } }, "required": ["type"] } });
             let mut any = vec![is_other];
             any.extend(
-                key_combinations_for_type("metal")
+                key_combination_conditions_for_type("metal")
                     .into_iter()
                     .map(|(name, condition)| json!({ name: condition })),
             );
@@ -282,7 +282,7 @@ fn projection_key_conditions(orbiter: &Value) -> Value {
 }
 
 /// Returns conditions on combinations of a type's keys.
-fn key_combinations_for_type(kind: &str) -> Vec<(&'static str, Value)> {
+fn key_combination_conditions_for_type(kind: &str) -> Vec<(&'static str, Value)> {
     match kind {
         // Require exactly one of three groups of keys.
         "metal" => vec![(

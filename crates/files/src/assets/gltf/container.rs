@@ -62,7 +62,7 @@ impl GltfFile {
                 format!("column {}: {}", error.column(), truncate_parser_message(&what)),
             )
         })?;
-        check_min_gltf_version(&root).map_err(wrong)?;
+        check_gltf_versions(&root).map_err(wrong)?;
         check_required_extensions(&root).map_err(wrong)?;
         // Extract the binary chunk, then read the buffers.
         let binary = binary.map(|range| {
@@ -207,7 +207,7 @@ fn glb_chunk_ranges(bytes: &[u8]) -> Result<(ByteRange, Option<ByteRange>), Gltf
     Ok((json.ok_or_else(|| GltfError::new("the JSON chunk is missing"))?, binary))
 }
 
-fn check_min_gltf_version(root: &Root) -> Result<(), GltfError> {
+fn check_gltf_versions(root: &Root) -> Result<(), GltfError> {
     let required = root.asset.min_version.as_str();
     let number = |text: &str| text.parse::<u32>().ok();
     let parts = match required.split_once('.') {

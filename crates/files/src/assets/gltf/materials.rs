@@ -116,7 +116,7 @@ impl MaterialConverter<'_> {
         material.is_two_sided = json.double_sided;
         if let Some(map) = &json.normal_texture {
             material.normal_strength = map.scale.max(0.0);
-            material.normal = self.texture_ref_from_gltf(map)?;
+            material.normal = self.texture_lookup_from_gltf(map)?;
         }
         let strength =
             extensions.emissive_strength.as_ref().map_or(1.0, |extension| extension.emissive_strength);
@@ -307,14 +307,14 @@ impl MaterialConverter<'_> {
         let finite = |part: f64| if part.is_finite() { part.clamp(0.0, 1e18) } else { 0.0 };
         let factor = DVec3::from(factor.to_array().map(finite));
         let texture = match texture {
-            Some(info) if factor != DVec3::ZERO => self.texture_ref_from_gltf(info)?,
+            Some(info) if factor != DVec3::ZERO => self.texture_lookup_from_gltf(info)?,
             Some(_) | None => None,
         };
         Ok(TexturedValue { factor, texture })
     }
 
     /// Converts a texture reference, and adds notes about unsupported features.
-    fn texture_ref_from_gltf(&mut self, info: &TextureInfo) -> Result<Option<TextureLookup>, GltfError> {
+    fn texture_lookup_from_gltf(&mut self, info: &TextureInfo) -> Result<Option<TextureLookup>, GltfError> {
         let root = &self.container.root;
         let texture = root.textures.get(info.index);
         let texture = texture

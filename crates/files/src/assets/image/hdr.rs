@@ -190,7 +190,7 @@ impl HeaderVariables {
         HdrHeader {
             scan,
             scales: correction.map(|correction| 1.0 / (exposure * correction)),
-            space: matrix.map_or_else(ColorSpace::default, ColorSpace::from_rec_709_matrix),
+            space: matrix.map_or_else(ColorSpace::default, ColorSpace::from_matrix_to_rec_709),
             warnings: self.warnings,
         }
     }

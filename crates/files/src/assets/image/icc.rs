@@ -15,7 +15,7 @@ pub(super) fn color_space_from_profile(profile: &[u8], is_gray: bool) -> Result<
         (Some(b"RGB "), Some(b"XYZ ")) if !is_gray => profile.rgb_color_space(),
         (Some(b"GRAY"), Some(b"XYZ " | b"Lab ")) if is_gray => {
             let curve = profile.read_curve_tag(b"kTRC").ok_or(UNSUPPORTED_CURVES)?;
-            Ok(ColorSpace::from_curves_and_rec_709_matrix(
+            Ok(ColorSpace::from_curves_and_matrix_to_rec_709(
                 Some([curve.clone(), curve.clone(), curve]),
                 DMat3::IDENTITY,
             ))
@@ -80,7 +80,7 @@ impl<'a> IccProfile<'a> {
             return Err(DEGENERATE_PRIMARIES.to_owned());
         }
         let matrix = colorants_to_rec_709_matrix(colorants).ok_or(DEGENERATE_PRIMARIES)?;
-        Ok(ColorSpace::from_curves_and_rec_709_matrix(Some([r, g, b]), matrix))
+        Ok(ColorSpace::from_curves_and_matrix_to_rec_709(Some([r, g, b]), matrix))
     }
 
     fn read_xyz_tag(&self, name: &[u8; 4]) -> Option<DVec3> {

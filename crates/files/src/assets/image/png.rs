@@ -134,7 +134,7 @@ impl<R: BufRead + Seek> PngDecoder<R> {
         if matrix.is_none() {
             metadata.add_warning("a degenerate cHRM chunk is ignored");
         }
-        ColorSpace::from_curves_and_rec_709_matrix(
+        ColorSpace::from_curves_and_matrix_to_rec_709(
             Some([curve.clone(), curve.clone(), curve]),
             matrix.unwrap_or(DMat3::IDENTITY),
         )
@@ -211,7 +211,7 @@ fn color_space_from_cicp(points: png::CodingIndependentCodePoints) -> Option<Col
     let is_plain = points.matrix_coefficients == 0 && points.is_video_full_range_image;
     let curves = [curve.clone(), curve.clone(), curve];
     is_plain.then(|| {
-        Some(ColorSpace::from_curves_and_rec_709_matrix(Some(curves), primaries.to_rec_709_matrix()?))
+        Some(ColorSpace::from_curves_and_matrix_to_rec_709(Some(curves), primaries.to_rec_709_matrix()?))
     })?
 }
 

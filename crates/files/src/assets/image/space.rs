@@ -131,7 +131,7 @@ pub(super) struct ColorSpace {
 
 impl ColorSpace {
     /// Creates a color space from its curves (`None` for the default) and its matrix to linear Rec. 709.
-    pub(super) fn from_curves_and_rec_709_matrix(
+    pub(super) fn from_curves_and_matrix_to_rec_709(
         curves: Option<[TransferFunction; 3]>,
         matrix: DMat3,
     ) -> Self {
@@ -142,8 +142,8 @@ impl ColorSpace {
     }
 
     /// Creates a color space that differs from the default only in its primaries.
-    pub(super) fn from_rec_709_matrix(matrix: DMat3) -> Self {
-        Self::from_curves_and_rec_709_matrix(None, matrix)
+    pub(super) fn from_matrix_to_rec_709(matrix: DMat3) -> Self {
+        Self::from_curves_and_matrix_to_rec_709(None, matrix)
     }
 
     pub(super) fn is_default(&self) -> bool {
@@ -220,16 +220,16 @@ mod tests {
     #[test]
     fn the_default_space_is_recognized() {
         let srgb = || Some([TransferFunction::Srgb, TransferFunction::Srgb, TransferFunction::Srgb]);
-        assert!(ColorSpace::from_curves_and_rec_709_matrix(srgb(), DMat3::IDENTITY).is_default());
+        assert!(ColorSpace::from_curves_and_matrix_to_rec_709(srgb(), DMat3::IDENTITY).is_default());
         assert!(
-            !ColorSpace::from_curves_and_rec_709_matrix(
+            !ColorSpace::from_curves_and_matrix_to_rec_709(
                 srgb(),
                 DMat3::from_diagonal(DVec3::new(1.0, 0.9, 1.0))
             )
             .is_default()
         );
         assert!(
-            !ColorSpace::from_curves_and_rec_709_matrix(
+            !ColorSpace::from_curves_and_matrix_to_rec_709(
                 Some([TransferFunction::Srgb, TransferFunction::LINEAR, TransferFunction::Srgb]),
                 DMat3::IDENTITY
             )

@@ -149,7 +149,7 @@ impl ColorComponentExtremes {
     }
 
     /// Returns the byte offset of a color with a fraction, and a warning that the header declares integers.
-    pub(super) fn dropped_fraction_warning(&self) -> Option<(usize, String)> {
+    pub(super) fn fraction_in_integer_color_warning(&self) -> Option<(usize, String)> {
         self.fraction.map(|(value, at)| (at, dropped_color_fractions_warning(value)))
     }
 }

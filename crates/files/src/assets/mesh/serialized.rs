@@ -274,8 +274,8 @@ fn add_vertices_of_version_5(
     Ok(faces.chunks_exact(4).flat_map(|face| face[..3].iter().copied()).collect())
 }
 
-/// Appends `count` vertices. If only some of the merged meshes have normals or texture coordinates, the others
-/// get zeros.
+/// Appends `count` vertices. If only some of the merged meshes have normals or texture coordinates, the
+/// others get zeros.
 fn append_vertices(parsed: &mut ParsedMesh, count: usize, positions: &[f64], normals: &[f64], uvs: &[f64]) {
     let before = parsed.positions.len();
     parsed.positions.extend(positions.chunks_exact(3).map(DVec3::from_slice));

@@ -3,15 +3,15 @@
 use arrayvec::ArrayVec;
 
 use super::{Bvh, ChildRef, DEEP_STACK, SHALLOW_STACK};
-use crate::accel::{NodeBoundsAndDepth, RayBoxInterval};
+use crate::accel::{RayBoxInterval, VisitedNode};
 use crate::geometry::aabb::{SLAB_PAD, SlabRay};
 use crate::geometry::packet::set_bit_lanes;
 use crate::geometry::{Aabb, Ray};
 
 impl Bvh {
     /// Visits the primitives in the leaves that the ray may hit, roughly front to back. `test(id, t_max)`
-    /// tests a primitive and returns the ray's new end on a hit. Primitives exactly at the ray's end are still
-    /// tested because the caller may break ties by id.
+    /// tests a primitive and returns the ray's new end on a hit. Primitives exactly at the ray's end are
+    /// still tested because the caller may break ties by id.
     #[inline]
     pub fn visit_primitives_front_to_back(&self, ray: &Ray, mut test: impl FnMut(u32, f32) -> Option<f32>) {
         if let Some(shells) = &self.shells {
@@ -99,14 +99,14 @@ impl Bvh {
     pub fn visit_nodes_hit_by_ray(
         &self,
         ray: &Ray,
-        mut visit: impl FnMut(&NodeBoundsAndDepth, &RayBoxInterval) -> bool,
+        mut visit: impl FnMut(&VisitedNode, &RayBoxInterval) -> bool,
         mut own: impl FnMut(u32, u32),
     ) {
         let root = (self.bounds, ChildRef { first: 0, count: 0 }, 0);
         let mut pending = if self.nodes.is_empty() { Vec::new() } else { vec![root] };
         while let Some((bounds, child, depth)) = pending.pop() {
             let Some(stretch) = RayBoxInterval::new(&bounds, ray) else { continue };
-            if !visit(&NodeBoundsAndDepth { bounds, depth, shapes: child.count }, &stretch) {
+            if !visit(&VisitedNode { bounds, depth, shapes: child.count }, &stretch) {
                 continue;
             }
             if child.count > 0 {

@@ -10,7 +10,7 @@ mod node;
 mod traverse;
 mod validate;
 
-use crate::accel::{NodeBoundsAndDepth, RayBoxInterval};
+use crate::accel::{RayBoxInterval, VisitedNode};
 use crate::control::{CancelToken, Canceled};
 use crate::geometry::{Aabb, Ray};
 use crate::math::Vec3;
@@ -113,10 +113,10 @@ impl KdTree {
 
     /// Visits the nodes whose cells the ray hits, parents first, in an order that depends only on the tree.
     /// `visit` returns whether to descend.
-    pub fn visit_nodes_along_ray(
+    pub fn visit_nodes_hit_by_ray(
         &self,
         ray: &Ray,
-        mut visit: impl FnMut(&NodeBoundsAndDepth, &RayBoxInterval) -> bool,
+        mut visit: impl FnMut(&VisitedNode, &RayBoxInterval) -> bool,
     ) {
         let mut pending = if self.nodes.is_empty() { Vec::new() } else { vec![(self.bounds, 0_u32, 0)] };
         while let Some((bounds, place, depth)) = pending.pop() {
@@ -126,7 +126,7 @@ impl KdTree {
                 DecodedNode::Inner { .. } => 0,
                 DecodedNode::Leaf { count, .. } => count,
             };
-            if !visit(&NodeBoundsAndDepth { bounds, depth, shapes }, &stretch) {
+            if !visit(&VisitedNode { bounds, depth, shapes }, &stretch) {
                 continue;
             }
             if let DecodedNode::Inner { axis, at, right } = kind {

@@ -14,7 +14,7 @@ use crate::math::Vec3;
 
 pub use simd::{InstructionSet, SimdKernel, pages};
 
-use crate::accel::{F32x16, NodeBoundsAndDepth, PACKET_SIZE, RayBoxInterval};
+use crate::accel::{F32x16, PACKET_SIZE, RayBoxInterval, VisitedNode};
 
 use node::{TrianglePack, WideNode};
 
@@ -111,7 +111,7 @@ impl WideBvh {
     pub fn visit_nodes_hit_by_ray(
         &self,
         ray: &Ray,
-        mut visit: impl FnMut(&NodeBoundsAndDepth, &RayBoxInterval) -> bool,
+        mut visit: impl FnMut(&VisitedNode, &RayBoxInterval) -> bool,
     ) {
         let root = (self.bounds, node::Child::Inner(0), 0);
         let mut pending = if self.nodes.is_empty() { Vec::new() } else { vec![root] };
@@ -124,7 +124,7 @@ impl WideBvh {
                     packs.iter().map(|pack| pack.ids().count() as u32).sum()
                 }
             };
-            if !visit(&NodeBoundsAndDepth { bounds, depth, shapes }, &stretch) {
+            if !visit(&VisitedNode { bounds, depth, shapes }, &stretch) {
                 continue;
             }
             if let node::Child::Inner(place) = child {

@@ -1,8 +1,8 @@
 //! Emitting shapes, one file each.
 //!
 //! Each shape implements its light sampling in a [`ShapeEmitter`]. To add a shape, add its file, a variant of
-//! [`Emitter`], and arms in `of_any` and [`new_front_area_light`]. If the shape is flat, also add bounds on its
-//! emission. Shapes without a loop in `packet` are sampled point by point.
+//! [`Emitter`], and arms in `of_any` and [`new_front_area_light`]. If the shape is flat, also add bounds on
+//! its emission. Shapes without a loop in `packet` are sampled point by point.
 
 pub mod cuboid;
 pub mod disk;
@@ -223,7 +223,7 @@ fn front_emitter(shape: &Shape) -> Option<Emitter> {
 
 /// Creates the light on one side of a see-through shape, or returns `None` if the shape is infinite or has no
 /// area.
-pub fn create_see_through_side_light(
+pub fn new_see_through_side_light(
     shape: &Shape,
     side: Side,
     radiance: Vec3,
@@ -358,7 +358,7 @@ impl AreaLight {
     pub fn sample_unmodulated(&self, point: Vec3, normal: Vec3, u: [f32; 2]) -> Option<LightSample> {
         let own = |sample: SampledLightPoint| {
             let SampledLightPoint { direction, target, factor } = sample;
-            let (end, source) = (ShadowRayEnd::At(target), self.scene_geometry_id());
+            let (end, source) = (ShadowRayEnd::At(target), self.geometry_of_light());
             (factor > 0.0).then(|| LightSample { end, direction, weight: self.radiance * factor, source })
         };
         of_any!(&self.shape,
@@ -367,7 +367,7 @@ impl AreaLight {
     }
 
     /// The light's geometry.
-    pub(super) fn scene_geometry_id(&self) -> GeometryOfLight {
+    pub(super) fn geometry_of_light(&self) -> GeometryOfLight {
         let is_sheer = matches!(self.shape, Emitter::SeeThrough(_));
         if is_sheer { GeometryOfLight::SeeThrough(self.object) } else { GeometryOfLight::Object(self.object) }
     }

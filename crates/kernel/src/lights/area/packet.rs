@@ -33,7 +33,7 @@ impl AreaLight {
         used: u32,
         u: &[F32x16; 2],
     ) -> LightSamplePacket {
-        let source = self.scene_geometry_id();
+        let source = self.geometry_of_light();
         macro_rules! packet_from {
             ($emitter:expr) => {
                 packet_of!(source, i => {

@@ -8,7 +8,7 @@ pub struct PiecewiseLinear<const NODES: usize>(pub [f64; NODES]);
 impl<const NODES: usize> PiecewiseLinear<NODES> {
     const PIECES: f64 = (NODES - 1) as f64;
 
-    /// Mean of the interpolated values.
+    /// Integral over [0, 1] of the interpolated values.
     pub fn integral(&self) -> f64 {
         let inner: f64 = self.0[1..NODES - 1].iter().sum();
         (inner + 0.5 * (self.0[0] + self.0[NODES - 1])) / Self::PIECES
@@ -16,8 +16,8 @@ impl<const NODES: usize> PiecewiseLinear<NODES> {
 
     /// Inverts the cumulative distribution at `u` in [0, 1). Returns the position and its density.
     pub fn sample(&self, u: f64) -> (f64, f64) {
-        let mean = self.integral();
-        let (mut rest, mut piece) = (u * mean * Self::PIECES, 0);
+        let integral = self.integral();
+        let (mut rest, mut piece) = (u * integral * Self::PIECES, 0);
         while piece < NODES - 2 {
             let own = 0.5 * (self.0[piece] + self.0[piece + 1]);
             if rest < own {
@@ -29,7 +29,7 @@ impl<const NODES: usize> PiecewiseLinear<NODES> {
         let (low, high) = (self.0[piece], self.0[piece + 1]);
         let root = (low * low + 2.0 * rest * (high - low)).max(0.0).sqrt();
         let along = if low + root > 0.0 { (2.0 * rest / (low + root)).min(1.0) } else { 0.0 };
-        ((piece as f64 + along) / Self::PIECES, (low + (high - low) * along) / mean)
+        ((piece as f64 + along) / Self::PIECES, (low + (high - low) * along) / integral)
     }
 
     /// Density at a position.

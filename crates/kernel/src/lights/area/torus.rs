@@ -257,7 +257,7 @@ impl TorusView {
         }
         let in_slice = slice
             .elevation_distribution(self)
-            .pdf((0.5 + 0.5 * slice.elevation_sine_from_slice_tangent(tangent)).clamp(0.0, 1.0));
+            .pdf((0.5 + 0.5 * slice.elevation_sin_from_slice_tan(tangent)).clamp(0.0, 1.0));
         self.tau_to_angle_density(slices.pdf(share), share * self.reach) * 0.5 * in_slice / factor
     }
 }
@@ -272,7 +272,7 @@ impl TorusCrossSection {
     }
 
     /// Converts the tangent of the angle to the circle's center to the relative sine of the elevation.
-    fn elevation_sine_from_slice_tangent(&self, tangent: f64) -> f64 {
+    fn elevation_sin_from_slice_tan(&self, tangent: f64) -> f64 {
         let y = self.gap * tangent;
         y / (self.gap * self.gap + self.off * self.off + y * y).sqrt() / self.sine
     }

@@ -20,7 +20,8 @@ pub trait DeltaPositionLight {
     /// Intensity in a unit direction away from the light, relative to the peak intensity, in [0, 1].
     fn relative_intensity(&self, away: Vec3) -> f32;
 
-    /// Power divided by the peak intensity, in sr: the integral of [`DeltaPositionLight::relative_intensity`].
+    /// Power divided by the peak intensity, in sr: the integral of
+    /// [`DeltaPositionLight::relative_intensity`].
     fn effective_solid_angle(&self) -> f64;
 
     /// Samples a unit direction away from the light, with a pdf proportional to the intensity. `u` is in [0,

@@ -89,7 +89,7 @@ impl DirectionalLight {
     /// Samples a unit direction to the light, assuming a disk of uniform radiance.
     #[inline(always)]
     fn sample_uniform_disk(&self, u: [f32; 2]) -> (Vec3, Vec3) {
-        if self.is_single_direction() {
+        if self.has_no_angular_extent() {
             return (self.to_light, self.irradiance);
         }
         let direction = Frame::from_normal(self.to_light).to_world(warp::cone(u, self.one_minus_cos));
@@ -118,7 +118,7 @@ impl DirectionalLight {
 
     /// Whether a unit direction is inside the disk. Compares chords, which is accurate even for small disks.
     fn contains(&self, direction: Vec3) -> bool {
-        !self.is_single_direction()
+        !self.has_no_angular_extent()
             && (direction - self.to_light).length_squared() <= 2.0 * self.one_minus_cos
     }
 }
@@ -148,7 +148,7 @@ impl InfiniteLight for DirectionalLight {
     }
 
     #[inline]
-    fn is_single_direction(&self) -> bool {
+    fn has_no_angular_extent(&self) -> bool {
         self.one_minus_cos == 0.0
     }
 }

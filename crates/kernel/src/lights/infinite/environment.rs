@@ -63,7 +63,7 @@ impl MapOrientation {
 
     /// The turn for sampling the map. Pass sampled directions to [`Self::to_world`].
     #[inline(always)]
-    fn turn_for_map_sampling(self) -> f32 {
+    fn turn_in_map(self) -> f32 {
         match self {
             Self::Turn(turn) => turn,
             Self::Rotation(_) => 0.0,
@@ -130,7 +130,7 @@ impl Environment {
                 orientation
                     .convert_if_general_rotation(&mut directions, |own, direction| own.to_map(direction).0);
                 let (mut colors, pdfs) =
-                    sky.lookup_color_and_pdf_packet(&directions, orientation.turn_for_map_sampling());
+                    sky.lookup_color_and_pdf_packet(&directions, orientation.turn_in_map());
                 for i in 0..PACKET_SIZE {
                     let color = lane(&colors, i) * *factor;
                     set_lane(&mut colors, i, color);
@@ -155,8 +155,7 @@ impl Environment {
                 (directions, radiance, pdfs)
             }
             Self::Map { sky, factor, orientation } => {
-                let (mut directions, mut colors, pdfs) =
-                    sky.sample_packet(u, orientation.turn_for_map_sampling());
+                let (mut directions, mut colors, pdfs) = sky.sample_packet(u, orientation.turn_in_map());
                 orientation.convert_if_general_rotation(&mut directions, MapOrientation::to_world);
                 for i in 0..PACKET_SIZE {
                     let color = lane(&colors, i) * *factor;
@@ -206,7 +205,7 @@ impl Environment {
                 (Frame::from_normal(normal).to_world(warp::cone(u, 1.0)), *radiance, HEMISPHERE_PDF)
             }
             Self::Map { sky, factor, orientation } => {
-                let (direction, color, pdf) = sky.sample(u, orientation.turn_for_map_sampling());
+                let (direction, color, pdf) = sky.sample(u, orientation.turn_in_map());
                 (orientation.to_world(direction), color * *factor, pdf)
             }
             Self::Sky { dome, frame } => dome.sample(frame, u),
@@ -227,7 +226,7 @@ impl InfiniteLight for Environment {
         match self {
             Self::Constant(radiance) => (warp::cone(u, 2.0), *radiance * (4.0 * PI)),
             Self::Map { sky, factor, orientation } => {
-                let (direction, color, pdf) = sky.sample(u, orientation.turn_for_map_sampling());
+                let (direction, color, pdf) = sky.sample(u, orientation.turn_in_map());
                 // The pdf is 0 at the centers of black texels.
                 (orientation.to_world(direction), color * *factor * if pdf > 0.0 { 1.0 / pdf } else { 0.0 })
             }
@@ -264,7 +263,7 @@ impl InfiniteLight for Environment {
         None
     }
 
-    fn is_single_direction(&self) -> bool {
+    fn has_no_angular_extent(&self) -> bool {
         false
     }
 }

@@ -70,9 +70,9 @@ impl EnvironmentMap {
 
     /// Creates a map from nonnegative texels whose rows have the given polar angles. Returns `None` if all
     /// texels are black.
-    pub fn with_row_placement(texels: Arc<Texels>, map_rows: MapRowPlacement) -> Option<Self> {
+    pub fn with_row_placement(texels: Arc<Texels>, placement: MapRowPlacement) -> Option<Self> {
         let (columns, rows) = (texels.width as usize, texels.height as usize);
-        let scale_and_offset @ (scale, offset) = map_rows.scale_and_offset(texels.height);
+        let scale_and_offset @ (scale, offset) = placement.scale_and_offset(texels.height);
         let height = |row: usize| match row {
             0 => 1.0,
             row if row > rows => -1.0,

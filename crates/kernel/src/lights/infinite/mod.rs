@@ -32,5 +32,5 @@ pub trait InfiniteLight {
     fn direction_to_center(&self) -> Option<Vec3>;
 
     /// Whether the light has no angular extent.
-    fn is_single_direction(&self) -> bool;
+    fn has_no_angular_extent(&self) -> bool;
 }

@@ -123,7 +123,7 @@ fn partition_into_children(leaves: &mut [LightLeaf], token: &CancelToken) -> Res
     Ok(groups.into_iter().map(|group| group.count).collect())
 }
 
-/// A range of leaves.
+/// A group of consecutive leaves.
 struct LeafGroup {
     start: usize,
     count: usize,

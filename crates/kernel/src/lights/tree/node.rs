@@ -289,15 +289,15 @@ fn light_importances(
     has_lobes: bool,
 ) -> ImportanceAndNearnessPacket {
     match (is_plain, has_lobes) {
-        (true, false) => specialized_contributions::<true, false>(bounds, receivers),
-        (false, false) => specialized_contributions::<false, false>(bounds, receivers),
-        (true, true) => specialized_contributions::<true, true>(bounds, receivers),
-        (false, true) => specialized_contributions::<false, true>(bounds, receivers),
+        (true, false) => specialized_importances::<true, false>(bounds, receivers),
+        (false, false) => specialized_importances::<false, false>(bounds, receivers),
+        (true, true) => specialized_importances::<true, true>(bounds, receivers),
+        (false, true) => specialized_importances::<false, true>(bounds, receivers),
     }
 }
 
 #[inline(always)]
-fn specialized_contributions<const IS_PLAIN: bool, const HAS_LOBE: bool>(
+fn specialized_importances<const IS_PLAIN: bool, const HAS_LOBE: bool>(
     bounds: &LightBoundsPacket,
     receivers: &ReceiverPacket,
 ) -> ImportanceAndNearnessPacket {

@@ -1,4 +1,5 @@
-//! Checks that a surface in a packet does not depend on the other surfaces, and a lobe not on the other lobes.
+//! Checks that a surface in a packet does not depend on the other surfaces, and a lobe not on the other
+//! lobes.
 
 use crate::materials::bsdf::{LobesToSample, ShownLobes};
 use crate::materials::bxdf::{Bxdf, ShadingGeometry};

@@ -51,8 +51,8 @@ impl NarrowLightPath {
     }
 }
 
-/// Estimates a value from samples with `side` strata along each axis. Half as many are usually enough, so they
-/// are used first, and kept if the estimate `is_close` to the exact value.
+/// Estimates a value from samples with `side` strata along each axis. Half as many are usually enough, so
+/// they are used first, and kept if the estimate `is_close` to the exact value.
 pub fn estimate_close_to_exact<T>(
     side: u32,
     estimate: impl Fn(u32) -> T,

@@ -413,11 +413,11 @@ kinds! {
     Phong(Phong, PhongBxdf, kept: BxdfPacket<PhongBxdf>),
     /// The Phong model with diffuse transmission.
     TranslucentPhong(TranslucentPhong, TranslucentBxdf<false>, kept: Box<BxdfPacket<TranslucentBxdf<false>>>),
-    /// An isotropic microfacet fresnel_conductor.
+    /// An isotropic microfacet conductor.
     Conductor(Conductor, ConductorBxdf<false, false>, kept: Box<BxdfPacket<ConductorBxdf<false, false>>>),
-    /// A microfacet fresnel_conductor whose lobe is stretched along u or v.
+    /// A microfacet conductor whose lobe is stretched along u or v.
     BrushedConductor(Conductor, ConductorBxdf<true, false>, kept: Box<BxdfPacket<ConductorBxdf<true, false>>>),
-    /// A fresnel_conductor with the Beckmann distribution, whose lobe may be stretched along u or v.
+    /// A conductor with the Beckmann distribution, whose lobe may be stretched along u or v.
     BeckmannConductor(Conductor, ConductorBxdf<true, true>, kept: Box<BxdfPacket<ConductorBxdf<true, true>>>),
     /// A diffuse base under a microfacet coat.
     Plastic(Plastic, PlasticBxdf<false>, kept: Box<BxdfPacket<PlasticBxdf<false>>>),
@@ -429,9 +429,9 @@ kinds! {
     CoatedPhong(Box<CoatedMaterial<Phong>>, CoatedBxdf<PhongBxdf>, kept: Box<BxdfPacket<CoatedBxdf<PhongBxdf>>>),
     /// Translucent Phong under a clear coat.
     CoatedTranslucent(Box<CoatedMaterial<TranslucentPhong>>, CoatedBxdf<TranslucentBxdf<false>>, kept: Box<BxdfPacket<CoatedBxdf<TranslucentBxdf<false>>>>),
-    /// A fresnel_conductor under a clear coat, brushed or not.
+    /// A conductor under a clear coat, brushed or not.
     CoatedConductor(Box<CoatedMaterial<Conductor>>, CoatedBxdf<ConductorBxdf<true, false>>, kept: Box<BxdfPacket<CoatedBxdf<ConductorBxdf<true, false>>>>),
-    /// A fresnel_conductor with the Beckmann distribution under a clear coat.
+    /// A conductor with the Beckmann distribution under a clear coat.
     CoatedBeckmannConductor(Box<CoatedMaterial<Conductor>>, CoatedBxdf<ConductorBxdf<true, true>>, kept: Box<BxdfPacket<CoatedBxdf<ConductorBxdf<true, true>>>>),
     /// Plastic under a clear coat.
     CoatedPlastic(Box<CoatedMaterial<Plastic>>, CoatedBxdf<PlasticBxdf<false>>, kept: Box<BxdfPacket<CoatedBxdf<PlasticBxdf<false>>>>),

@@ -1,9 +1,9 @@
 //! Gradient noise in the coordinates of the shape.
 //!
-//! An octave is Perlin's noise (*Improving Noise*, SIGGRAPH 2002): a lattice point has a random gradient, one of
-//! the twelve directions toward the edges of a cube, and the linear functions of the eight lattice points around
-//! a point are blended with the quintic 6t⁵ − 15t⁴ + 10t³. The gradients come from an integer hash of the
-//! lattice point, so the noise has no period. It is 0 at every lattice point.
+//! An octave is Perlin's noise (*Improving Noise*, SIGGRAPH 2002): a lattice point has a random gradient, one
+//! of the twelve directions toward the edges of a cube, and the linear functions of the eight lattice points
+//! around a point are blended with the quintic 6t⁵ − 15t⁴ + 10t³. The gradients come from an integer hash of
+//! the lattice point, so the noise has no period. It is 0 at every lattice point.
 
 use crate::materials::footprint::TexturePoint;
 use crate::math::random::hash;
@@ -39,8 +39,8 @@ const GRADIENTS: [Vec3; 12] = [
 /// Scales an octave to [−1, 1]. Without it, the maximum is 1.0364.
 const SCALE: f32 = 0.964;
 
-/// Variance of an octave: the mean over a cell of Σ w²·|d|²·2/3, where w is the weight of a lattice point, d the
-/// offset from it, and 2/3 the mean square of a component of a gradient; times [`SCALE`]².
+/// Variance of an octave: the mean over a cell of Σ w²·|d|²·2/3, where w is the weight of a lattice point, d
+/// the offset from it, and 2/3 the mean square of a component of a gradient; times [`SCALE`]².
 const VARIANCE: f32 = 0.067_76;
 
 /// Value of the noise, and the variance that the filter has removed.
@@ -55,9 +55,9 @@ pub struct FilteredNoiseValue {
 impl Noise {
     /// Noise at a point, without the octaves that are smaller than the footprint if `is_filtered` is true.
     ///
-    /// An octave of size s fades with smoothstep(s/w − 1), where w is the length of the footprint's longer axis:
-    /// it is complete for s ≥ 2w, where it is sampled at least twice per lattice cell, and gone for s ≤ w. This
-    /// clamps the number of octaves, as `FBm` of pbrt-v4 does, but also fades the first octave.
+    /// An octave of size s fades with smoothstep(s/w − 1), where w is the length of the footprint's longer
+    /// axis: it is complete for s ≥ 2w, where it is sampled at least twice per lattice cell, and gone for s ≤
+    /// w. This clamps the number of octaves, as `FBm` of pbrt-v4 does, but also fades the first octave.
     pub fn evaluate(&self, at: &TexturePoint, is_filtered: bool) -> FilteredNoiseValue {
         let (position, width) = object_position_and_width(at, is_filtered);
         let (mut value, mut removed_variance) = (0.0, 0.0);
@@ -160,14 +160,14 @@ impl LatticeCell {
 
     /// Derivatives of the noise with respect to the coordinates in the cell.
     fn gradient(&self) -> Vec3 {
-        let (ramps, weights) = (self.corner_dot_products(), self.at.to_array().map(quintic));
-        // The blended gradients of the ramps, and the ramps times the derivatives of their weights.
+        let (products, weights) = (self.corner_dot_products(), self.at.to_array().map(quintic));
+        // The blended gradients, and the dot products times the derivatives of their weights.
         let derivative = |axis: usize| {
             let blended = interpolate_trilinearly(self.gradients.map(|gradient| gradient[axis]), weights);
             let at_end = |end: f32| {
                 let mut weights = weights;
                 weights[axis] = end;
-                interpolate_trilinearly(ramps, weights)
+                interpolate_trilinearly(products, weights)
             };
             blended + quintic_derivative(self.at[axis]) * (at_end(1.0) - at_end(0.0))
         };
@@ -314,7 +314,8 @@ mod tests {
 
     #[test]
     fn octaves_fade_below_the_footprint() {
-        // With sizes of 1, ½ and ¼ and a footprint of 0.3, only the last octave is gone, and the second fades.
+        // With sizes of 1, ½ and ¼ and a footprint of 0.3, only the last octave is gone, and the second
+        // fades.
         let noise = octaves(3);
         let at = DVec3::new(0.3, 0.4, 0.7);
         let octave = |number: usize, fade: f64| {

@@ -64,8 +64,8 @@ impl Pattern {
             Self::Noise(noise) => {
                 let FilteredNoiseValue { value, removed_variance } = noise.evaluate(at, is_filtered);
                 let mean = mix(first, second, share_from_noise(value));
-                // Approximate the distribution of the faded octaves by a parabola with the same variance, which
-                // is a fifth of its squared half width.
+                // Approximate the distribution of the faded octaves by a parabola with the same variance,
+                // which is a fifth of its squared half width.
                 let half_width = 0.5 * (second - first).abs() * (5.0 * removed_variance).sqrt();
                 if half_width > 0.0 {
                     let x = ((mean - cutoff) / half_width).clamp(-1.0, 1.0);
@@ -136,8 +136,8 @@ impl PatternTexture {
         colors
     }
 
-    /// Fraction of the footprint where the red channel is at least `cutoff`. Without a filter, the fraction is
-    /// 0 or 1.
+    /// Fraction of the footprint where the red channel is at least `cutoff`. Without a filter, the fraction
+    /// is 0 or 1.
     pub fn coverage_above_cutoff(&self, at: &TexturePoint, cutoff: f32) -> f32 {
         let values = self.colors.map(|color| color.x);
         self.pattern.coverage_above_cutoff(at, self.is_filtered, values, cutoff)

@@ -1,8 +1,8 @@
 //! Checkerboards and bands: patterns of two tones along the texture coordinates.
 //!
-//! Both are products of square waves, so their mean over a box is a closed form: the mean of a square wave over
-//! an interval is the difference of two values of its integral, a triangle wave (Heckbert, *Survey of Texture
-//! Mapping*, 1986, section on direct filtering). The box is the bounding box of the footprint.
+//! Both are products of square waves, so their mean over a box is a closed form: the mean of a square wave
+//! over an interval is the difference of two values of its integral, a triangle wave (Heckbert, *Survey of
+//! Texture Mapping*, 1986, section on direct filtering). The box is the bounding box of the footprint.
 
 use super::mapping::TextureMapping;
 use super::wrap::finite_or_zero;
@@ -94,8 +94,8 @@ fn square_wave(x: f64, width: f64) -> f64 {
     ((integral(x + 0.5 * width) - integral(x - 0.5 * width)) / width).clamp(-1.0, 1.0)
 }
 
-/// Slope of [`square_wave`]: the difference of the wave at the ends of the interval, divided by its width. The
-/// width is at least [`SLOPE_STEP`].
+/// Slope of [`square_wave`]: the difference of the wave at the ends of the interval, divided by its width.
+/// The width is at least [`SLOPE_STEP`].
 fn wave_slope(x: f64, width: f64) -> f64 {
     let step = width.max(SLOPE_STEP);
     (square_wave(x + 0.5 * step, 0.0) - square_wave(x - 0.5 * step, 0.0)) / step

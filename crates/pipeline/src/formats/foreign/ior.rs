@@ -37,8 +37,8 @@ pub(crate) fn dielectric_names() -> impl Iterator<Item = &'static str> {
     DIELECTRICS.iter().map(|(name, _)| *name)
 }
 
-/// Average of the Fresnel reflectance of a smooth dielectric over a cosine-weighted hemisphere, ∫ 2 F(μ) μ dμ.
-/// `eta` is the index of refraction on the transmitted side, relative to the incident side.
+/// Average of the Fresnel reflectance of a smooth dielectric over a cosine-weighted hemisphere, ∫ 2 F(μ) μ
+/// dμ. `eta` is the index of refraction on the transmitted side, relative to the incident side.
 pub(crate) fn mean_fresnel_reflectance(eta: f64) -> f64 {
     const STEPS: u32 = 4096;
     let cosine = |index: u32| (f64::from(index) + 0.5) / f64::from(STEPS);

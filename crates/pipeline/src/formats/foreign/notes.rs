@@ -62,7 +62,7 @@ impl NoteCollector {
     }
 
     /// Adds a substitution that changes the lighting.
-    pub(crate) fn substitute_changing_lighting(&mut self, subject: &str, text: &str, span: Range<usize>) {
+    pub(crate) fn note_lighting_substitution(&mut self, subject: &str, text: &str, span: Range<usize>) {
         self.add(NoteKind::LightSubstitution, subject, text, span);
     }
 
@@ -101,7 +101,7 @@ mod tests {
         notes.note("`bump`", "fades", 0..3);
         notes.note_substitution("`curve`", "skipped", 4..7);
         notes.note_substitution("`curve`", "skipped", 0..3);
-        notes.substitute_changing_lighting("`hair`", "diffuse", second + 6..second + 10);
+        notes.note_lighting_substitution("`hair`", "diffuse", second + 6..second + 10);
         let (notes, substitutions) = notes.into_diagnostics(&sources);
         assert_eq!(notes.iter().map(|one| &*one.message).collect::<Vec<_>>(), ["`bump`: fades"]);
         let messages: Vec<_> = substitutions.iter().map(|one| &*one.message).collect();

@@ -62,9 +62,9 @@ impl MaterialBuilder<'_, '_> {
 
     /// Adds a material with diffuse transmission.
     ///
-    /// glTF mixes reflection and transmission with the weight t, and the result with the metal. If t is constant
-    /// and there is no metal, (1 − t) times the base color is reflected and t times the transmission color
-    /// is transmitted. Otherwise, both mixes are blends.
+    /// glTF mixes reflection and transmission with the weight t, and the result with the metal. If t is
+    /// constant and there is no metal, (1 − t) times the base color is reflected and t times the transmission
+    /// color is transmitted. Otherwise, both mixes are blends.
     fn add_translucent_material(
         &mut self,
         material: &ModelMaterial,

@@ -86,8 +86,8 @@ pub(super) fn convert(
     Ok(ImportedScene { document, files, substitutions, notes: Vec::new() })
 }
 
-/// Rejects a file that `glimt check` would reject. Checks the scene that `glimt MODEL` would render instead of
-/// the imported one, whose texture files have not been written yet.
+/// Rejects a file that `glimt check` would reject. Checks the scene that `glimt MODEL` would render instead
+/// of the imported one, whose texture files have not been written yet.
 fn check_scene_before_import(path: &Path, context: &ForeignReadContext<'_>) -> Result<(), ForeignError> {
     let errors = scene_from_document(read(path, context)?.document, path, &[]).err();
     // Ignore errors about file names, because the imported scene uses different file names.
@@ -199,7 +199,7 @@ impl SceneBuilder<'_> {
         let materials = MaterialBuilder::add_all(&scene.materials, &mut names, self);
         let mut shapes = UsedNames::default();
         for instance in &scene.instances {
-            self.add_mesh(instance, &materials[instance.material], &mut shapes);
+            self.add_mesh_table(instance, &materials[instance.material], &mut shapes);
         }
         add_ground(&mut self.document, &mut names, bounds, &eye);
     }
@@ -232,7 +232,7 @@ impl SceneBuilder<'_> {
         }
     }
 
-    fn add_mesh(&mut self, instance: &ModelInstance, material: &str, shapes: &mut UsedNames) {
+    fn add_mesh_table(&mut self, instance: &ModelInstance, material: &str, shapes: &mut UsedNames) {
         self.document.start_list_table("mesh");
         if !instance.name.is_empty() {
             self.document.set("name", shapes.make_unique(&instance.name, "mesh"));

@@ -11,8 +11,8 @@ use crate::formats::foreign::options::MissingAssetMode;
 use crate::system::file::{FileStamp, open_regular_file};
 
 impl SceneReader<'_> {
-    /// Searches for a file. Watches the places before the one where it is found, or all of them if it does not
-    /// exist.
+    /// Searches for a file. Watches the places before the one where it is found, or all of them if it does
+    /// not exist.
     pub(super) fn find_file(&mut self, name: &str, span: &Range<usize>) -> Option<PathBuf> {
         let own_folder = self.files.path_of_span(span).and_then(Path::parent);
         let own = own_folder.map(|folder| folder.join(name));
@@ -101,7 +101,7 @@ impl SceneReader<'_> {
                     "spectrum" => "not found; replaced by the default value",
                     _ => "not found; left out",
                 };
-                self.notes.substitute_changing_lighting(
+                self.notes.note_lighting_substitution(
                     &format!("{kind} {}", truncate_for_message(name)),
                     text,
                     span.clone(),

@@ -42,7 +42,7 @@ impl<'a> SceneReader<'a> {
         let color = color.unwrap_or(DVec3::splat(default));
         if color.min_element() < 0.0 {
             let subject = format!("a negative `{}`", truncate_for_message(name));
-            self.notes.substitute_changing_lighting(&subject, "replaced by 0", property.span.clone());
+            self.notes.note_lighting_substitution(&subject, "replaced by 0", property.span.clone());
         }
         ColorSource::Constant(color.max(DVec3::ZERO))
     }
@@ -210,7 +210,7 @@ impl<'a> SceneReader<'a> {
                     truncate_for_message(&object.plugin)
                 );
                 let limited = number.clamp(0.0, 1.0);
-                self.notes.substitute_changing_lighting(
+                self.notes.note_lighting_substitution(
                     &subject,
                     &format!("replaced by {limited}"),
                     span_of(object, name),

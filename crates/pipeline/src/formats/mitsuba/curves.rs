@@ -125,7 +125,8 @@ fn linear_segment_tube([start, end]: [ControlPoint; 2]) -> MeshData {
     })
 }
 
-/// The part of a linear segment at a row of its mesh: 0 on the first sphere, 1 on the second one.
+/// The end of a linear segment to which a row of its mesh belongs: 0 for the first sphere, 1 for the second
+/// one.
 fn snap_to_segment_end(v: f64) -> f64 {
     if v < 0.5 { 0.0 } else { 1.0 }
 }

@@ -65,7 +65,7 @@ impl<'a> SceneReader<'a> {
             ColorSource::Constant(color) => color,
             ColorSource::Texture(_) => {
                 let subject = format!("a texture in `{}`", truncate_for_message(&object.plugin));
-                self.notes.substitute_changing_lighting(&subject, "replaced by white", span_of(object, name));
+                self.notes.note_lighting_substitution(&subject, "replaced by white", span_of(object, name));
                 DVec3::ONE
             }
         }
@@ -108,7 +108,7 @@ impl<'a> SceneReader<'a> {
             && !self.add_spot_texture(object, texture.target, cutoff)
         {
             let text = "the texture is left out";
-            self.notes.substitute_changing_lighting("a spot light with a texture", text, object.span.clone());
+            self.notes.note_lighting_substitution("a spot light with a texture", text, object.span.clone());
         }
         self.document.start_list_table("light");
         self.add_light_id_comment(object);
@@ -211,7 +211,7 @@ impl<'a> SceneReader<'a> {
         };
         if x.cross(y).dot(z) < 0.0 || x.dot(y).abs().max(x.dot(z).abs()).max(y.dot(z).abs()) > 1e-4 {
             let text = "the map is only rotated, not mirrored or skewed";
-            self.notes.substitute_changing_lighting(
+            self.notes.note_lighting_substitution(
                 "an environment with a mirroring or skewed `to_world`",
                 text,
                 object.span.clone(),

@@ -17,7 +17,7 @@ use crate::scene::nearest::nearest_name;
 const MAX_PROPERTIES: usize = 1000;
 
 /// Index of an object in the graph.
-pub(super) type NodeIndex = usize;
+pub(super) type GraphObjectIndex = usize;
 
 /// Kinds of objects, named after their XML elements.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -107,7 +107,7 @@ pub(super) struct Property {
 #[derive(Clone, Debug)]
 pub(super) struct Child {
     pub(super) name: Option<String>,
-    pub(super) target: NodeIndex,
+    pub(super) target: GraphObjectIndex,
     pub(super) span: Range<usize>,
     pub(super) is_used: Cell<bool>,
 }
@@ -137,19 +137,19 @@ pub(super) struct SceneGraph {
 /// Builds the graph from the elements of a scene.
 pub(super) struct GraphBuilder<'a> {
     graph: SceneGraph,
-    ids: HashMap<String, NodeIndex>,
+    ids: HashMap<String, GraphObjectIndex>,
     /// References to resolve when all objects are known.
     references: Vec<UnresolvedReference>,
     files: &'a SourceFiles,
     pub(super) errors: Vec<Diagnostic>,
     /// The last object with too many properties.
-    overfull: Option<NodeIndex>,
+    overfull: Option<GraphObjectIndex>,
     token: &'a CancelToken,
 }
 
 /// An unresolved reference.
 struct UnresolvedReference {
-    parent: NodeIndex,
+    parent: GraphObjectIndex,
     /// Index in the parent's children.
     child: usize,
     id: String,
@@ -157,7 +157,7 @@ struct UnresolvedReference {
 }
 
 /// Target of an unresolved reference.
-const UNRESOLVED: NodeIndex = usize::MAX;
+const UNRESOLVED: GraphObjectIndex = usize::MAX;
 
 impl<'a> GraphBuilder<'a> {
     pub(super) fn new(files: &'a SourceFiles, token: &'a CancelToken) -> Self {
@@ -182,7 +182,7 @@ impl<'a> GraphBuilder<'a> {
         if self.errors.is_empty() { Ok(self.graph) } else { Err(self.errors) }
     }
 
-    fn add_object(&mut self, element: &Element, kind: ObjectKind) -> Option<NodeIndex> {
+    fn add_object(&mut self, element: &Element, kind: ObjectKind) -> Option<GraphObjectIndex> {
         let plugin = element.attribute("type");
         if plugin.is_none() && kind != ObjectKind::Scene {
             let help = format!("write <{} type=\"…\">", truncate_for_message(&element.tag));
@@ -218,7 +218,7 @@ impl<'a> GraphBuilder<'a> {
     }
 
     /// Adds a nested object, a reference or a property to an object.
-    fn add_child_or_property(&mut self, parent: NodeIndex, element: &Element) {
+    fn add_child_or_property(&mut self, parent: GraphObjectIndex, element: &Element) {
         if self.token.check_pause_and_cancel().is_err() {
             return;
         }
@@ -288,7 +288,7 @@ impl<'a> GraphBuilder<'a> {
         found
     }
 
-    fn add_property(&mut self, parent: NodeIndex, element: &Element) {
+    fn add_property(&mut self, parent: GraphObjectIndex, element: &Element) {
         let Some(name) = self.required_attribute(element, "name") else { return };
         let name = to_snake_case_if_old(&name.value, element.is_old);
         let value = match self.parse_property_value(element) {
@@ -383,7 +383,7 @@ impl<'a> GraphBuilder<'a> {
     }
 
     /// Converts properties of versions below 2 to those of Mitsuba 3.
-    fn upgrade_old_properties(&mut self, index: NodeIndex) {
+    fn upgrade_old_properties(&mut self, index: GraphObjectIndex) {
         let object = &mut self.graph.objects[index];
         if object.plugin == "diffuse" {
             let old = "diffuse_reflectance";

@@ -1,6 +1,6 @@
 //! Converts groups and their instances.
 
-use super::graph::{NodeIndex, ObjectKind, PluginInstance};
+use super::graph::{GraphObjectIndex, ObjectKind, PluginInstance};
 use super::reader::SceneReader;
 use super::shapes::ShapeTarget;
 use super::xml::truncate_for_message;
@@ -37,7 +37,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Returns the name of a group, adding it if it is new. Returns `None` if it has no visible shapes.
-    fn add_group_if_new(&mut self, index: NodeIndex, depth: u32) -> Option<String> {
+    fn add_group_if_new(&mut self, index: GraphObjectIndex, depth: u32) -> Option<String> {
         if let Some(known) = self.groups.get(&index) {
             return known.clone();
         }

@@ -1,14 +1,14 @@
 //! Identifies materials that several shapes share.
 
-use super::graph::NodeIndex;
+use super::graph::GraphObjectIndex;
 
 /// Everything that determines a converted material. Shapes with equal keys share a material.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(super) struct MaterialKey {
     /// The BSDF, or `None` for the default one.
-    pub(super) bsdf: Option<NodeIndex>,
+    pub(super) bsdf: Option<GraphObjectIndex>,
     /// The area light of the shape.
-    pub(super) emitter: Option<NodeIndex>,
+    pub(super) emitter: Option<GraphObjectIndex>,
     /// Texture coordinates of the shape, or the default if the material has no textures.
     pub(super) uv: UvFlips,
     /// The mesh whose attributes the material uses.
@@ -29,11 +29,11 @@ pub(super) struct UvFlips {
 /// Identifies the material of a part of a blend within one shape.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) struct BlendPartKey {
-    pub(super) bsdf: NodeIndex,
+    pub(super) bsdf: GraphObjectIndex,
     pub(super) uv: UvFlips,
     /// Whether a `twosided` contains the blend.
     pub(super) is_two_sided: bool,
     /// The `mask` and the `coating` that contain the blend.
-    pub(super) mask: Option<NodeIndex>,
-    pub(super) coat: Option<NodeIndex>,
+    pub(super) mask: Option<GraphObjectIndex>,
+    pub(super) coat: Option<GraphObjectIndex>,
 }

@@ -6,8 +6,8 @@ use super::xml::truncate_for_message;
 use crate::math::DVec3;
 
 impl<'a> SceneReader<'a> {
-    /// Returns the transmittance per unit of length of the medium in a shape, if the medium only absorbs light
-    /// and the shape is of solid glass. Substitutes other media.
+    /// Returns the transmittance per unit of length of the medium in a shape, if the medium only absorbs
+    /// light and the shape is of solid glass. Substitutes other media.
     pub(super) fn interior_tint(&mut self, object: &'a PluginInstance) -> Option<DVec3> {
         let mut tint = None;
         for child in self.children_of_kind(object, ObjectKind::Medium) {
@@ -25,7 +25,7 @@ impl<'a> SceneReader<'a> {
                 }
                 None => {
                     let subject = format!("medium `{}`", truncate_for_message(&medium.plugin));
-                    self.notes.substitute_changing_lighting(
+                    self.notes.note_lighting_substitution(
                         &subject,
                         "light passes it unchanged",
                         medium.span.clone(),

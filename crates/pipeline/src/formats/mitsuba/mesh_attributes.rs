@@ -5,7 +5,7 @@
 
 use std::path::Path;
 
-use super::graph::{NodeIndex, ObjectKind, PluginInstance};
+use super::graph::{GraphObjectIndex, ObjectKind, PluginInstance};
 use super::ply::{AttributedMesh, MeshAttribute, attribute_in_table, face_attribute, triangle_mesh};
 use super::reader::SceneReader;
 use super::shapes::ShapeTarget;
@@ -64,10 +64,10 @@ fn add_atlas_coordinates(mesh: &mut MeshData) {
 }
 
 impl<'a> SceneReader<'a> {
-    /// Returns how the BSDF of a shape uses the attributes of its mesh. Returns `None` if it does not use them
-    /// or if glimt cannot express it.
+    /// Returns how the BSDF of a shape uses the attributes of its mesh. Returns `None` if it does not use
+    /// them or if glimt cannot express it.
     fn attribute_use(&mut self, object: &'a PluginInstance) -> Option<AttributeUse> {
-        let mut pending: Vec<NodeIndex> =
+        let mut pending: Vec<GraphObjectIndex> =
             self.children_of_kind(object, ObjectKind::Bsdf).map(|child| child.target).collect();
         let (mut faces, mut others, mut colors, mut bsdfs) = (0, 0, 0, 0);
         let mut visits = 0;

@@ -1,7 +1,7 @@
 //! Reads scenes of Mitsuba 3, 2 and 0.6.
 //!
-//! `xml` reads the files, `graph` resolves references, and the other modules convert the objects to the tables
-//! of a scene file, which [`SceneReader`] collects.
+//! `xml` reads the files, `graph` resolves references, and the other modules convert the objects to the
+//! tables of a scene file, which [`SceneReader`] collects.
 
 mod assets;
 mod bsdfs;
@@ -60,7 +60,7 @@ pub(super) fn import_with_assets(
     let (ForeignScene { document, notes, substitutions, .. }, copies) =
         read_scene(path, Some(folder), context)?;
     let mut files = read_files_to_copy(copies, context.token)?;
-    let generated = document.in_memory_files().iter();
+    let generated = document.added_in_memory_files().iter();
     files.extend(generated.map(|(name, file)| (PathBuf::from(name), file.bytes.to_vec())));
     Ok(ImportedScene { document, files, substitutions, notes })
 }
@@ -91,7 +91,7 @@ fn read_scene(
     let mut reader = SceneReader::new(&graph, &sources.files, path, &folders, asset_folder, context);
     reader.document.add_comment_above_next_table(format!("{}, as glimt shows it.", file_name(path)));
     let scene = reader.object_by_index(0);
-    reader.add_render_and_camera(scene);
+    reader.add_render_and_camera_tables(scene);
     for child in &scene.children {
         token.check_pause_and_cancel()?;
         match reader.object_by_index(child.target).kind {

@@ -1,11 +1,11 @@
 //! Converts lights that project images (`projector`, textured `spot`).
 //!
-//! glimt's spotlights have no textures. A small thin pane in front of a light, with an index of refraction of 1,
-//! filters the light in the same way: shadow rays are multiplied by its `tint`.
+//! glimt's spotlights have no textures. A small thin pane in front of a light, with an index of refraction of
+//! 1, filters the light in the same way: shadow rays are multiplied by its `tint`.
 
 use std::f64::consts::PI;
 
-use super::graph::{NodeIndex, ObjectKind, PluginInstance};
+use super::graph::{GraphObjectIndex, ObjectKind, PluginInstance};
 use super::material_key::UvFlips;
 use super::reader::{ColorRole, ColorSource, SceneReader};
 use super::settings::FilmWindow;
@@ -108,7 +108,8 @@ impl<'a> SceneReader<'a> {
         (!self.camera_position.is_some_and(would_see_pane)).then_some(frame)
     }
 
-    /// Moves a camera that is at a light with a pane, and looks in the light's direction, in front of the pane.
+    /// Moves a camera that is at a light with a pane, and looks in the light's direction, in front of the
+    /// pane.
     pub(super) fn camera_in_front_of_panes(
         &mut self,
         scene: &'a PluginInstance,
@@ -155,7 +156,7 @@ impl<'a> SceneReader<'a> {
     pub(super) fn add_spot_texture(
         &mut self,
         object: &'a PluginInstance,
-        texture: NodeIndex,
+        texture: GraphObjectIndex,
         cutoff: f64,
     ) -> bool {
         let bitmap = self.object_by_index(texture);

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use super::graph::{Child, NodeIndex, ObjectKind, PluginInstance, SceneGraph};
+use super::graph::{Child, GraphObjectIndex, ObjectKind, PluginInstance, SceneGraph};
 use super::material_key::{BlendPartKey, MaterialKey};
 use super::plastic::PlasticCoat;
 use super::ply::AttributedMesh;
@@ -43,14 +43,14 @@ pub(super) enum ColorRole {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum ColorSource {
     Constant(DVec3),
-    Texture(NodeIndex),
+    Texture(GraphObjectIndex),
 }
 
 /// A constant number or a texture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum NumberSource {
     Constant(f64),
-    Texture(NodeIndex),
+    Texture(GraphObjectIndex),
 }
 
 /// Converts a scene graph to a scene document.
@@ -81,7 +81,7 @@ pub(super) struct SceneReader<'a> {
     /// Names of the converted textures, by their formatted table entries.
     pub(super) textures: HashMap<String, String>,
     /// Names of the groups in the document. `None` marks groups without visible shapes.
-    pub(super) groups: HashMap<NodeIndex, Option<String>>,
+    pub(super) groups: HashMap<GraphObjectIndex, Option<String>>,
     /// Names of the files that an import writes, by source path.
     pub(super) asset_names: BTreeMap<PathBuf, String>,
     pub(super) used_asset_names: HashSet<String>,
@@ -94,7 +94,7 @@ pub(super) struct SceneReader<'a> {
     /// Position of the camera.
     pub(super) camera_position: Option<DVec3>,
     /// Objects whose unused properties have been reported.
-    pub(super) reported_unused: HashSet<NodeIndex>,
+    pub(super) reported_unused: HashSet<GraphObjectIndex>,
     pub(super) has_environment: bool,
     /// Name of the black material, if the document has one.
     pub(super) black: Option<String>,
@@ -107,7 +107,7 @@ pub(super) struct SceneReader<'a> {
     /// Inspected properties of files, by path and part.
     pub(super) inspected_files: HashMap<(PathBuf, Option<i64>), bool>,
     /// Objects whose nested objects were reported as unused.
-    pub(super) reported_children: HashSet<NodeIndex>,
+    pub(super) reported_children: HashSet<GraphObjectIndex>,
     /// Number of materials in the document.
     pub(super) material_count: usize,
     /// Number of shapes converted, including those that contain shapes.
@@ -200,12 +200,12 @@ impl<'a> SceneReader<'a> {
     /// Whether a predicate is true for any of the objects or any object in them.
     pub(super) fn any_nested_object_satisfies(
         &self,
-        objects: impl IntoIterator<Item = NodeIndex>,
+        objects: impl IntoIterator<Item = GraphObjectIndex>,
         is_found: impl Fn(&PluginInstance) -> bool,
     ) -> bool {
-        let mut pending: Vec<NodeIndex> = objects.into_iter().collect();
+        let mut pending: Vec<GraphObjectIndex> = objects.into_iter().collect();
         // References can lead to the same object on many paths.
-        let mut visited: HashSet<NodeIndex> = HashSet::new();
+        let mut visited: HashSet<GraphObjectIndex> = HashSet::new();
         while let Some(index) = pending.pop() {
             if !visited.insert(index) {
                 continue;
@@ -220,7 +220,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Returns an object. The result does not borrow the reader.
-    pub(super) fn object_by_index(&self, index: NodeIndex) -> &'a PluginInstance {
+    pub(super) fn object_by_index(&self, index: GraphObjectIndex) -> &'a PluginInstance {
         &self.graph.objects[index]
     }
 
@@ -369,7 +369,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Adds a note for each property of an object that has not been read.
-    pub(super) fn report_unused(&mut self, index: NodeIndex) {
+    pub(super) fn report_unused(&mut self, index: GraphObjectIndex) {
         /// Properties that do not affect glimt's images.
         const IRRELEVANT: [&str; 12] = [
             "name",

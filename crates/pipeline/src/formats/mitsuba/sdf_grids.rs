@@ -1,7 +1,7 @@
 //! Converts grids of signed distances (`sdfgrid`) to meshes.
 //!
-//! Mitsuba interpolates the distances trilinearly. Every voxel with a sign change is split into cells, and every
-//! cell into six tetrahedra, whose edges meet the surface at the roots of the interpolant.
+//! Mitsuba interpolates the distances trilinearly. Every voxel with a sign change is split into cells, and
+//! every cell into six tetrahedra, whose edges meet the surface at the roots of the interpolant.
 
 use super::graph::PluginInstance;
 use super::material_key::UvFlips;
@@ -57,7 +57,7 @@ impl DistanceGrid {
             .then_some(Self { size, values })
     }
 
-    /// The value at a point of the grid, in voxels.
+    /// The value at a voxel corner, in voxels.
     fn value_at_voxel_corner(&self, at: DVec3) -> f64 {
         let [x, y, z] = at.to_array().map(|index| index as usize);
         let [width, height, _] = self.size;

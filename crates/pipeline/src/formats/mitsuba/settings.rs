@@ -83,13 +83,13 @@ impl FilmWindow {
 
 impl<'a> SceneReader<'a> {
     /// Adds the `[render]` and `[camera]` tables.
-    pub(super) fn add_render_and_camera(&mut self, scene: &'a PluginInstance) {
+    pub(super) fn add_render_and_camera_tables(&mut self, scene: &'a PluginInstance) {
         let Some(sensor) = self.select_sensor(scene) else { return };
         let sensor_index = sensor.target;
         let sensor = self.object_by_index(sensor_index);
         if let Some(medium) = self.children_of_kind(sensor, ObjectKind::Medium).next() {
             let text = "the camera is in a vacuum";
-            self.notes.substitute_changing_lighting("a sensor in a medium", text, medium.span.clone());
+            self.notes.note_lighting_substitution("a sensor in a medium", text, medium.span.clone());
         }
         let film = self.children_of_kind(sensor, ObjectKind::Film).next().map(|child| child.target);
         let window = self.film_window(film.map(|index| self.object_by_index(index)));
@@ -157,7 +157,7 @@ impl<'a> SceneReader<'a> {
             "hdrfilm" | "ldrfilm" | "mfilm" | "tiledhdrfilm" | "pngfilm" | "exrfilm" => {}
             "specfilm" => {
                 let text = "rendered with the colors of the CIE observer instead of the film's channels";
-                self.notes.substitute_changing_lighting("`specfilm`", text, film.span.clone());
+                self.notes.note_lighting_substitution("`specfilm`", text, film.span.clone());
             }
             _ => self.report_unknown_plugin(film, "film", &["hdrfilm", "ldrfilm", "specfilm"]),
         }
@@ -319,11 +319,7 @@ impl<'a> SceneReader<'a> {
             }
             "depth" | "ao" | "field" | "normals" | "albedo" => {
                 let text = "replaced by `path`; --view shows normals, albedo and depth";
-                self.notes.substitute_changing_lighting(
-                    &format!("`{plugin}`"),
-                    text,
-                    integrator.span.clone(),
-                );
+                self.notes.note_lighting_substitution(&format!("`{plugin}`"), text, integrator.span.clone());
                 self.document.set("integrator", "path");
                 self.document.set("max_depth", depth);
             }
@@ -353,7 +349,7 @@ impl<'a> SceneReader<'a> {
         let [width, height, depth] = [linear.x_axis, linear.y_axis, linear.z_axis].map(DVec3::length);
         if skew > 1e-4 || (width / height - 1.0).abs() > 1e-4 {
             let text = "rendered without skew or stretch";
-            self.notes.substitute_changing_lighting(
+            self.notes.note_lighting_substitution(
                 "a sensor with a skewed or stretched `to_world`",
                 text,
                 sensor.span.clone(),

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::graph::{Child, NodeIndex, ObjectKind, PluginInstance};
+use super::graph::{Child, GraphObjectIndex, ObjectKind, PluginInstance};
 use super::material_key::UvFlips;
 use super::placement::{cylinder_matrix, has_normals};
 use super::reader::SceneReader;
@@ -60,7 +60,7 @@ impl ShapeTarget<'_> {
 
 impl<'a> SceneReader<'a> {
     /// Adds a shape. Returns whether anything was added.
-    pub(super) fn add_shape(&mut self, index: NodeIndex, target: ShapeTarget<'_>) -> bool {
+    pub(super) fn add_shape(&mut self, index: GraphObjectIndex, target: ShapeTarget<'_>) -> bool {
         let object = self.object_by_index(index);
         if !self.count_shape_and_check_limit(object) {
             return false;
@@ -128,7 +128,7 @@ impl<'a> SceneReader<'a> {
         let bsdf: Option<&'a Child> = self.children_of_kind(object, ObjectKind::Bsdf).next();
         if let Some(second) = self.children_of_kind(object, ObjectKind::Bsdf).nth(1) {
             let text = "only the first is used";
-            self.notes.substitute_changing_lighting("a shape with several BSDFs", text, second.span.clone());
+            self.notes.note_lighting_substitution("a shape with several BSDFs", text, second.span.clone());
         }
         let emitter = self.children_of_kind(object, ObjectKind::Emitter).next();
         let emitter = emitter.and_then(|child| {
@@ -155,7 +155,7 @@ impl<'a> SceneReader<'a> {
     /// Reports flipped normals, which glimt ignores. In Mitsuba, mirroring transforms flip normals as well.
     fn note_flipped_normals(&mut self, object: &'a PluginInstance) {
         let text = "the front side is not flipped, which matters for one-sided materials, glass and lights";
-        self.notes.substitute_changing_lighting(
+        self.notes.note_lighting_substitution(
             "normals flipped by `flip_normals` or a mirroring `to_world`",
             text,
             object.span.clone(),

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::graph::{NodeIndex, ObjectKind, PluginInstance};
+use super::graph::{GraphObjectIndex, ObjectKind, PluginInstance};
 use super::material_key::UvFlips;
 use super::reader::{ColorRole, ColorSource, SceneReader, luminance};
 use super::settings::span_of;
@@ -86,7 +86,7 @@ impl<'a> SceneReader<'a> {
     /// missing.
     pub(super) fn find_or_add_texture(
         &mut self,
-        index: NodeIndex,
+        index: GraphObjectIndex,
         usage: MitsubaTextureUse,
         uv: UvFlips,
     ) -> Option<String> {
@@ -96,7 +96,7 @@ impl<'a> SceneReader<'a> {
     /// Like [`Self::find_or_add_texture`], with the colors multiplied by `factor`.
     pub(super) fn find_or_add_scaled_texture(
         &mut self,
-        index: NodeIndex,
+        index: GraphObjectIndex,
         usage: MitsubaTextureUse,
         uv: UvFlips,
         factor: f64,
@@ -117,7 +117,7 @@ impl<'a> SceneReader<'a> {
                     found
                 } else {
                     let text = "replaced by its usual value, gray";
-                    self.notes.substitute_changing_lighting(
+                    self.notes.note_lighting_substitution(
                         &format!("`{}`", object.plugin),
                         text,
                         object.span.clone(),
@@ -127,7 +127,7 @@ impl<'a> SceneReader<'a> {
             }
             "gridtexture" | "wireframe" | "curvature" | "volume" => {
                 let text = "replaced by gray";
-                self.notes.substitute_changing_lighting(
+                self.notes.note_lighting_substitution(
                     &format!("texture `{}`", object.plugin),
                     text,
                     object.span.clone(),
@@ -155,7 +155,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Returns the color of a spectrum that is used in place of a texture.
-    pub(super) fn color_if_spectrum(&mut self, index: NodeIndex, role: ColorRole) -> Option<DVec3> {
+    pub(super) fn color_if_spectrum(&mut self, index: GraphObjectIndex, role: ColorRole) -> Option<DVec3> {
         let object = self.object_by_index(index);
         match object.kind {
             ObjectKind::Spectrum => Some(self.spectrum_plugin_color(object, role)),
@@ -177,14 +177,22 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Returns the value of a number key that reads a texture.
-    pub(super) fn number_texture(&mut self, index: NodeIndex, uv: UvFlips) -> Option<SceneDocumentValue> {
+    pub(super) fn number_texture(
+        &mut self,
+        index: GraphObjectIndex,
+        uv: UvFlips,
+    ) -> Option<SceneDocumentValue> {
         let name = self.find_or_add_texture(index, MitsubaTextureUse::Number, uv)?;
         Some(SceneDocumentValue::Table(vec![("texture", name.into())]))
     }
 
-    /// Returns the value of `opacity` for a texture. Selects the red channel if the image may have alpha, which
-    /// `opacity` would read: Mitsuba takes the luminance, and masks are gray.
-    pub(super) fn opacity_texture(&mut self, index: NodeIndex, uv: UvFlips) -> Option<SceneDocumentValue> {
+    /// Returns the value of `opacity` for a texture. Selects the red channel if the image may have alpha,
+    /// which `opacity` would read: Mitsuba takes the luminance, and masks are gray.
+    pub(super) fn opacity_texture(
+        &mut self,
+        index: GraphObjectIndex,
+        uv: UvFlips,
+    ) -> Option<SceneDocumentValue> {
         let name = self.find_or_add_texture(index, MitsubaTextureUse::Number, uv)?;
         let mut entries = vec![("texture", name.into())];
         if self.image_may_have_alpha(self.object_by_index(index)) {
@@ -194,7 +202,11 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Returns the value of `roughness`, which is √α, for a texture of α.
-    pub(super) fn roughness_texture(&mut self, index: NodeIndex, uv: UvFlips) -> Option<SceneDocumentValue> {
+    pub(super) fn roughness_texture(
+        &mut self,
+        index: GraphObjectIndex,
+        uv: UvFlips,
+    ) -> Option<SceneDocumentValue> {
         let object = self.object_by_index(index);
         if object.plugin == "checkerboard" {
             // Convert both values exactly.
@@ -202,12 +214,16 @@ impl<'a> SceneReader<'a> {
             return Some(SceneDocumentValue::Table(vec![("texture", name.into())]));
         }
         let text = "used as √α instead of α";
-        self.notes.substitute_changing_lighting("a textured `alpha`", text, object.span.clone());
+        self.notes.note_lighting_substitution("a textured `alpha`", text, object.span.clone());
         self.number_texture(index, uv)
     }
 
     /// Returns the value of `bump`.
-    pub(super) fn height_texture(&mut self, index: NodeIndex, uv: UvFlips) -> Option<SceneDocumentValue> {
+    pub(super) fn height_texture(
+        &mut self,
+        index: GraphObjectIndex,
+        uv: UvFlips,
+    ) -> Option<SceneDocumentValue> {
         let name = self.find_or_add_texture(index, MitsubaTextureUse::Number, uv)?;
         Some(name.into())
     }
@@ -287,7 +303,7 @@ impl<'a> SceneReader<'a> {
             keys.push(("encoding", if is_linear { "linear" } else { "srgb" }.into()));
         } else if usage == MitsubaTextureUse::Normal && !is_raw && !is_float {
             let text = "read as linear; Mitsuba decodes it from sRGB";
-            self.notes.substitute_changing_lighting(
+            self.notes.note_lighting_substitution(
                 "a normal map that is not `raw`",
                 text,
                 object.span.clone(),
@@ -298,7 +314,7 @@ impl<'a> SceneReader<'a> {
             && (gamma - 2.2).abs() > 0.01
             && gamma > 0.0
         {
-            self.notes.substitute_changing_lighting(
+            self.notes.note_lighting_substitution(
                 "`gamma` of a bitmap",
                 "replaced by sRGB",
                 span_of(object, "gamma"),
@@ -316,7 +332,7 @@ impl<'a> SceneReader<'a> {
         let keys = UvAffineMap::new(&to_uv, uv, is_image).keys();
         keys.unwrap_or_else(|| {
             let text = "ignored";
-            self.notes.substitute_changing_lighting(
+            self.notes.note_lighting_substitution(
                 "`to_uv` that shears the texture",
                 text,
                 span_of(object, "to_uv"),
@@ -335,7 +351,7 @@ impl<'a> SceneReader<'a> {
         ) {
             ColorSource::Constant(color) => color,
             ColorSource::Texture(_) => {
-                self.notes.substitute_changing_lighting(
+                self.notes.note_lighting_substitution(
                     "a texture in a checkerboard",
                     "replaced by gray",
                     object.span.clone(),
@@ -405,7 +421,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Adds a checkerboard of α as a texture of √α.
-    fn add_square_root_checkerboard(&mut self, index: NodeIndex, uv: UvFlips) -> Option<String> {
+    fn add_square_root_checkerboard(&mut self, index: GraphObjectIndex, uv: UvFlips) -> Option<String> {
         let object = self.object_by_index(index);
         let [first, second] = self.checker_colors(object);
         let root = |color: DVec3| DVec3::splat(libm::sqrt(luminance(color).clamp(1e-4, 1.0)));

@@ -1,12 +1,12 @@
 //! Reports nested objects and settings that no function has read.
 
-use super::graph::{Child, NodeIndex, ObjectKind, PluginInstance};
+use super::graph::{Child, GraphObjectIndex, ObjectKind, PluginInstance};
 use super::reader::SceneReader;
 use super::xml::truncate_for_message;
 
 impl<'a> SceneReader<'a> {
     /// Notes nested objects of an object that no function has read.
-    pub(super) fn report_unused_children(&mut self, index: NodeIndex) {
+    pub(super) fn report_unused_children(&mut self, index: GraphObjectIndex) {
         let object = self.object_by_index(index);
         if self.reported_children.insert(index) {
             object.children.iter().filter(|child| !child.is_used.get()).for_each(|child| {
@@ -37,11 +37,11 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Notes unused properties and nested objects of the sensor, the integrator, and the objects in them.
-    pub(super) fn report_unused_settings(&mut self, scene: &'a PluginInstance, sensor: NodeIndex) {
+    pub(super) fn report_unused_settings(&mut self, scene: &'a PluginInstance, sensor: GraphObjectIndex) {
         let integrators = scene.children.iter().filter(|child| {
             child.is_used.get() && self.object_by_index(child.target).kind == ObjectKind::Integrator
         });
-        let mut pending: Vec<NodeIndex> = integrators.map(|child| child.target).collect();
+        let mut pending: Vec<GraphObjectIndex> = integrators.map(|child| child.target).collect();
         pending.push(sensor);
         while let Some(index) = pending.pop() {
             let object = self.object_by_index(index);

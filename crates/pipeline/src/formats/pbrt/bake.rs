@@ -63,7 +63,7 @@ impl PbrtConverter<'_> {
         let path = self.asset_path(&image.file.text);
         let stamp = FileStamp::from_path(&path);
         self.companions.push(Companion { path: path.clone(), hash: None, stamp });
-        memo::is_image_gray_memoized(&path, stamp, || {
+        memo::memoized_is_gray(&path, stamp, || {
             let Ok(texels) =
                 self.load_and_watch_image(image, ColorEncoding::CutOut(ColorTransferFunction::Srgb))
             else {

@@ -53,7 +53,7 @@ impl PbrtConverter<'_> {
             (true, None) => Ok(None),
             (true, emission) => {
                 let text = "it is visible";
-                self.notes.substitute_changing_lighting("a light hidden by `alpha`", text, entity.span());
+                self.notes.note_lighting_substitution("a light hidden by `alpha`", text, entity.span());
                 Ok(Some(ShapeProperties { emission, alpha: None, tint }))
             }
             (false, emission) => Ok(Some(ShapeProperties { emission, alpha, tint })),
@@ -146,7 +146,7 @@ impl PbrtConverter<'_> {
         let is_equal = areas.iter().all(|area| (area / mean - 1.0).abs() < 0.01);
         if !is_equal {
             let text = "every triangle has the same radiance instead of the same power";
-            self.notes.substitute_changing_lighting("`power` of a mesh", text, span);
+            self.notes.note_lighting_substitution("`power` of a mesh", text, span);
         }
         positive_area(mean, parameters)
     }
@@ -175,7 +175,7 @@ impl PbrtConverter<'_> {
                 None => {
                     let kind = medium.parameters.string("type")?.map_or("", |kind| &kind.text);
                     let subject = format!("medium `{kind}`");
-                    self.notes.substitute_changing_lighting(
+                    self.notes.note_lighting_substitution(
                         &subject,
                         "light passes through it unchanged",
                         medium.span(),

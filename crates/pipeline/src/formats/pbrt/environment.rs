@@ -210,8 +210,8 @@ fn glimt_map_direction(u: f64, v: f64) -> DVec3 {
     DVec3::new(sine * across, cosine, -sine * along)
 }
 
-/// Maps a unit vector to the square of an equal-area octahedral map (Clarberg, *Fast Equal-Area Mapping of the
-/// (Hemi)Sphere using SIMD*, 2008). (0, 0) is the top left corner, and the center is +z.
+/// Maps a unit vector to the square of an equal-area octahedral map (Clarberg, *Fast Equal-Area Mapping of
+/// the (Hemi)Sphere using SIMD*, 2008). (0, 0) is the top left corner, and the center is +z.
 fn square_of_direction(direction: DVec3) -> DVec2 {
     let [x, y, z] = direction.abs().to_array();
     let radius = (1.0 - z).max(0.0).sqrt();

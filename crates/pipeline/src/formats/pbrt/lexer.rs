@@ -79,7 +79,7 @@ impl<'a> Lexer<'a> {
     }
 
     /// An empty span at the end of the text.
-    pub(super) fn end_span(&self) -> Range<usize> {
+    pub(super) fn end_of_text_span(&self) -> Range<usize> {
         let end = self.base + self.text.trim_end().len();
         end..end
     }
@@ -228,6 +228,6 @@ mod tests {
         let mut lexer = Lexer::new(" # c\n a b", 0);
         assert_eq!(lexer.peek(), lexer.next());
         assert_eq!(lexer.next().expect("a token").map(|token| token.span), Some(8..9));
-        assert_eq!((lexer.next(), lexer.end_span()), (Ok(None), 9..9));
+        assert_eq!((lexer.next(), lexer.end_of_text_span()), (Ok(None), 9..9));
     }
 }

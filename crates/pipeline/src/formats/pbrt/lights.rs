@@ -41,12 +41,12 @@ impl PbrtConverter<'_> {
             "infinite" => self.read_infinite_light(light, &matrix, infinite)?,
             "goniometric" => {
                 let text = "a point light with the same intensity in every direction is used";
-                self.notes.substitute_changing_lighting("light `goniometric`", text, span);
+                self.notes.note_lighting_substitution("light `goniometric`", text, span);
                 entity.parameters.ignore(&["filename"]);
                 self.convert_point_light(light, &matrix)?;
             }
             "projection" => {
-                self.notes.substitute_changing_lighting("light `projection`", "skipped", span);
+                self.notes.note_lighting_substitution("light `projection`", "skipped", span);
                 entity.parameters.ignore(&["filename", "fov", "scale", "power"]);
             }
             other => {

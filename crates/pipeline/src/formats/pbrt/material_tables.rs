@@ -152,7 +152,7 @@ impl PbrtConverter<'_> {
                 LoweredMaterial::Table { name, has_inside: false, .. } => names.push(name),
                 LoweredMaterial::Table { .. } => {
                     let text = "only the other material is used";
-                    self.notes.substitute_changing_lighting("`mix` with a dielectric", text, span.clone());
+                    self.notes.note_lighting_substitution("`mix` with a dielectric", text, span.clone());
                 }
                 LoweredMaterial::Invisible => {
                     let message = "an `interface` material cannot be mixed";

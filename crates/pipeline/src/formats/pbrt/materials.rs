@@ -137,10 +137,10 @@ impl MaterialReader<'_, '_> {
                 self.parameters.ignore(&["filename"]);
                 self.keys.push(("diffuse", 0.5.into()));
                 let text = "a gray diffuse surface is used";
-                self.writer.notes.substitute_changing_lighting("material `measured`", text, entity.span());
+                self.writer.notes.note_lighting_substitution("material `measured`", text, entity.span());
             }
             "hair" => self.read_hair(entity)?,
-            other => return Err(unknown_material_type(other, kind)),
+            other => return Err(unknown_material_type_error(other, kind)),
         }
         self.read_bump()?;
         self.read_normal_map()?;
@@ -258,13 +258,13 @@ impl MaterialReader<'_, '_> {
         self.ignore_layer_medium()
     }
 
-    /// Reads the medium between the layers of a coated material.
+    /// Ignores the medium between the layers of a coated material, and notes if it is not clear.
     fn ignore_layer_medium(&mut self) -> PbrtResult<()> {
         let albedo = self.read_texture_node("albedo", TextureValueKind::REFLECTANCE)?;
         if albedo.is_some_and(|albedo| albedo.as_constant() != Some(DVec3::ZERO)) {
             let text = "the layer is clear";
             let span = self.parameters.span_of("albedo");
-            self.writer.notes.substitute_changing_lighting("`albedo` of a coat", text, span);
+            self.writer.notes.note_lighting_substitution("`albedo` of a coat", text, span);
         }
         self.parameters.ignore(&["thickness", "g", "maxdepth", "nsamples"]);
         Ok(())
@@ -389,7 +389,7 @@ impl MaterialReader<'_, '_> {
         self.add_isotropic_roughness("roughness", ["roughness", "uroughness", "vroughness"])?;
         self.parameters.ignore(&["mfp", "name", "scale"]);
         let text = "a diffuse surface under a coat is used; no light passes through the object";
-        self.writer.notes.substitute_changing_lighting("material `subsurface`", text, entity.span());
+        self.writer.notes.note_lighting_substitution("material `subsurface`", text, entity.span());
         Ok(())
     }
 
@@ -404,7 +404,7 @@ impl MaterialReader<'_, '_> {
         let ignored = ["sigma_a", "eumelanin", "pheomelanin", "eta", "beta_m", "beta_n", "alpha"];
         self.parameters.ignore(&ignored);
         let text = "a diffuse surface is used";
-        self.writer.notes.substitute_changing_lighting("material `hair`", text, entity.span());
+        self.writer.notes.note_lighting_substitution("material `hair`", text, entity.span());
         Ok(())
     }
 
@@ -479,7 +479,7 @@ fn diffusion_albedo(absorption: DVec3, scattering: DVec3, asymmetry: f64) -> DVe
     )
 }
 
-fn unknown_material_type(kind: &str, at: &Text) -> Box<PbrtError> {
+fn unknown_material_type_error(kind: &str, at: &Text) -> Box<PbrtError> {
     let shown = escape_and_truncate(kind, 40);
     if OLD_MATERIALS.contains(&kind) || kind == "kdsubsurface" || kind == "disney" {
         let error = PbrtError::new(at.span.clone(), format!("\"{shown}\" is a pbrt-v3 material"));

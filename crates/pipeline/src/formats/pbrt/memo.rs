@@ -14,11 +14,7 @@ static GRAY_IMAGES: LazyLock<Mutex<HashMap<PathBuf, (FileStamp, bool)>>> = LazyL
 static ENVIRONMENT: Mutex<Option<(String, Vec<u8>)>> = Mutex::new(None);
 
 /// Returns whether the image is gray. Calls `find` unless the result for this path and stamp is cached.
-pub(super) fn is_image_gray_memoized(
-    path: &Path,
-    stamp: Option<FileStamp>,
-    find: impl FnOnce() -> bool,
-) -> bool {
+pub(super) fn memoized_is_gray(path: &Path, stamp: Option<FileStamp>, find: impl FnOnce() -> bool) -> bool {
     let lock = || GRAY_IMAGES.lock().unwrap_or_else(PoisonError::into_inner);
     let known = lock().get(path).filter(|(known, _)| Some(*known) == stamp).map(|(_, is_gray)| *is_gray);
     known.unwrap_or_else(|| {
@@ -55,10 +51,10 @@ mod tests {
         let path = folder.path().join("a");
         std::fs::write(&path, "a").expect("written");
         let stamp = FileStamp::from_path(&path);
-        assert!(is_image_gray_memoized(&path, stamp, || true));
-        assert!(is_image_gray_memoized(&path, stamp, || false), "cached");
+        assert!(memoized_is_gray(&path, stamp, || true));
+        assert!(memoized_is_gray(&path, stamp, || false), "cached");
         std::fs::write(&path, "ab").expect("written");
-        assert!(!is_image_gray_memoized(&path, FileStamp::from_path(&path), || false));
+        assert!(!memoized_is_gray(&path, FileStamp::from_path(&path), || false));
         assert_eq!(memoized_environment_map("first of test".to_owned(), || vec![1]), [1]);
         assert_eq!(memoized_environment_map("second of test".to_owned(), || vec![2]), [2]);
     }

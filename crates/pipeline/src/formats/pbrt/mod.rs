@@ -43,10 +43,7 @@ use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::{SceneDocumentBuilder, SourceFiles};
 
 /// Reads a scene.
-pub(super) fn read_glimt_scene(
-    path: &Path,
-    context: &ForeignReadContext<'_>,
-) -> Result<ForeignScene, ForeignError> {
+pub(super) fn read(path: &Path, context: &ForeignReadContext<'_>) -> Result<ForeignScene, ForeignError> {
     read_scene(path, None, context).map(|(scene, _)| scene)
 }
 
@@ -56,11 +53,11 @@ pub(super) fn import_with_assets(
     folder: &str,
     context: &ForeignReadContext<'_>,
 ) -> Result<ImportedScene, ForeignError> {
-    check_scene_before_import(read_glimt_scene(path, context)?, path)?;
+    check_scene_before_import(read(path, context)?, path)?;
     let (ForeignScene { document, notes, substitutions, .. }, copies) =
         read_scene(path, Some(folder), context)?;
     let mut files = read_files_to_copy(copies, context.token)?;
-    let generated = document.in_memory_files().iter();
+    let generated = document.added_in_memory_files().iter();
     files.extend(generated.map(|(name, file)| (PathBuf::from(name), file.bytes.to_vec())));
     Ok(ImportedScene { document, files, substitutions, notes })
 }

@@ -22,7 +22,7 @@ use crate::system::file::{FileKind, file_kind_and_metadata};
 /// Maximum number of errors to report.
 const MAX_ERRORS: usize = 50;
 
-/// Where the document's meshes and images are stored.
+/// Maps the pbrt scene's files to the document's file names.
 pub(super) struct AssetPathResolver<'a> {
     /// Folder of the pbrt file.
     pub(super) source: PathBuf,
@@ -181,7 +181,7 @@ impl<'a> PbrtConverter<'a> {
             return false;
         }
         self.companions.push(Companion { path: self.asset_path(&file.text), hash: None, stamp: None });
-        self.notes.substitute_changing_lighting(&format!("missing {what}"), substitute, file.span.clone());
+        self.notes.note_lighting_substitution(&format!("missing {what}"), substitute, file.span.clone());
         true
     }
 

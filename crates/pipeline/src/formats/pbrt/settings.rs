@@ -115,7 +115,7 @@ impl PbrtConverter<'_> {
             "sppm" => self.convert_photons(parameters)?,
             "ao" | "function" => {
                 let text = "path tracing is used instead";
-                self.notes.substitute_changing_lighting(
+                self.notes.note_lighting_substitution(
                     &format!("integrator `{kind}`"),
                     text,
                     integrator.span(),

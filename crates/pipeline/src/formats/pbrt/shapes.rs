@@ -57,7 +57,7 @@ impl PbrtConverter<'_> {
         let entity = &shape.placed.entity;
         let (kind, span) = (&*entity.kind.text, entity.span());
         if kind == "curve" {
-            self.notes.substitute_changing_lighting("shape `curve`", "skipped", span);
+            self.notes.note_lighting_substitution("shape `curve`", "skipped", span);
             return Ok(());
         }
         if !SHAPES.contains(&kind) {

@@ -296,7 +296,7 @@ impl<'a> TextureResolver<'a> {
                 let (first, second) = (part(self, "tex1", 0.0)?, part(self, "tex2", 1.0)?);
                 parameters.ignore(&["dir"]);
                 let text = "the mean of the two textures is used";
-                notes.substitute_changing_lighting("texture `directionmix`", text, entity.span());
+                notes.note_lighting_substitution("texture `directionmix`", text, entity.span());
                 TextureNode::mix(first, second, TextureNode::Constant(DVec3::splat(0.5)))
             }
             "checkerboard" => {
@@ -328,7 +328,7 @@ impl<'a> TextureResolver<'a> {
             "fbm" | "wrinkled" | "windy" | "marble" => noise_node(texture, notes)?,
             "ptex" => {
                 parameters.ignore(&["filename", "encoding", "scale"]);
-                notes.substitute_changing_lighting(
+                notes.note_lighting_substitution(
                     "texture `ptex`",
                     "a constant of 0.5 is used",
                     entity.span(),

@@ -54,7 +54,7 @@ impl ProcessCheckpointState {
     }
 
     /// Records a failure and returns whether it is the first failure in the request.
-    pub(super) fn record_failure_and_is_first(&mut self, request: u64) -> bool {
+    pub(super) fn record_failure_and_check_first(&mut self, request: u64) -> bool {
         self.failed.replace(request) != Some(request)
     }
 

@@ -197,7 +197,7 @@ impl<'a> Checkpointer<'a> {
 
     fn report_failure(&self, why: &str) {
         let CheckpointContext { sink, lock, .. } = &self.around;
-        if lock.borrow_mut().record_failure_and_is_first(sink.generation) {
+        if lock.borrow_mut().record_failure_and_check_first(sink.generation) {
             self.send_update(CheckpointUpdate::Failed { message: format!("no checkpoint: {why}") });
         }
     }

@@ -139,7 +139,7 @@ impl Forecast {
             total_samples: self.total_units.div_ceil(pixels) as u32,
             is_total_fixed: !(moment.plan.settings.render.error > 0.0)
                 && moment.plan.limits.seconds.is_none(),
-            noise: self.noise.noise_and_next_milestone(work, self.rate.rate(), left),
+            noise: self.noise.noise_and_next_level(work, self.rate.rate(), left),
         }
     }
 

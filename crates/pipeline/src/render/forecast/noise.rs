@@ -47,7 +47,7 @@ impl NoiseTracker {
 
     /// Returns the last measured noise and its predicted decrease. `rate` is the work done per second, and
     /// `left` is the number of seconds until the end. Returns `None` before the first measurement.
-    pub(crate) fn noise_and_next_milestone(
+    pub(crate) fn noise_and_next_level(
         &self,
         work: WorkAmount,
         rate: Option<f64>,
@@ -120,15 +120,14 @@ mod tests {
     fn next_level_is_predicted_from_sample_count() {
         // Reaching 1 % takes 4.41 times as many samples. The rate is 10 units per second.
         let work = WorkAmount { done: 100.0, total: Some(10_000.0), aside: [0.0; 2] };
-        let last_measurement =
-            measured().noise_and_next_milestone(work, Some(10.0), Some(100.0)).expect("noise");
+        let last_measurement = measured().noise_and_next_level(work, Some(10.0), Some(100.0)).expect("noise");
         let (level, seconds) = last_measurement.next.expect("a level");
         assert!((level - 0.01).abs() < 1e-12 && (seconds - 34.1).abs() < 1e-6, "{level} {seconds}");
         assert_eq!((last_measurement.now, last_measurement.seconds), (0.021, 9.0));
         // Half of the time is spent on other activities.
         let half = WorkAmount { aside: [10.0, 10.0], ..work };
         let (_, seconds) = measured()
-            .noise_and_next_milestone(half, Some(10.0), Some(100.0))
+            .noise_and_next_level(half, Some(10.0), Some(100.0))
             .expect("noise")
             .next
             .expect("a level");
@@ -139,7 +138,7 @@ mod tests {
     fn prediction_accounts_for_work_since_measurement() {
         let work = WorkAmount { done: 400.0, total: Some(10_000.0), aside: [0.0; 2] };
         let last_measurement =
-            measured().noise_and_next_milestone(work, Some(10.0), Some(1000.0)).expect("noise");
+            measured().noise_and_next_level(work, Some(10.0), Some(1000.0)).expect("noise");
         assert_eq!(last_measurement.now, 0.021);
         // The expected current noise is 1.05 %, so reaching 0.5 % takes 4.41 times as many samples.
         let (level, seconds) = last_measurement.next.expect("a level");
@@ -151,11 +150,11 @@ mod tests {
         let work = WorkAmount { done: 100.0, total: Some(200.0), aside: [0.0; 2] };
         for left in [Some(10.0), Some(34.0), None] {
             assert_eq!(
-                measured().noise_and_next_milestone(work, Some(10.0), left).expect("noise").next,
+                measured().noise_and_next_level(work, Some(10.0), left).expect("noise").next,
                 None,
                 "{left:?}"
             );
         }
-        assert_eq!(measured().noise_and_next_milestone(work, None, Some(100.0)).expect("noise").next, None);
+        assert_eq!(measured().noise_and_next_level(work, None, Some(100.0)).expect("noise").next, None);
     }
 }

@@ -145,16 +145,15 @@ mod tests {
     use super::*;
     use crate::render::noise_goals::tests::one_tile_film;
 
-    fn decided_goals(
+    fn decided_goals_and_predictions(
         halves: [(f32, f32); 2],
         samples: u32,
         error: f64,
     ) -> (CellSampleGoals, ExpectedSamples) {
         let (mut goals, mut expected) = (CellSampleGoals::new_undecided(1), ExpectedSamples::unknown(1));
         let done = [[samples; 2]];
-        let judgement = goals
-            .decide_tile_sample_goals(&one_tile_film(halves, samples), &done, samples, error)
-            .expect("samples");
+        let judgement =
+            goals.decide_half_goals(&one_tile_film(halves, samples), &done, samples, error).expect("samples");
         expected.update_predictions(&judgement, &goals, &done);
         (goals, expected)
     }
@@ -162,7 +161,7 @@ mod tests {
     #[test]
     fn noise_of_both_halves_predicts_samples() {
         // The first half is smooth, but the second is noisy.
-        let (goals, expected) = decided_goals([(1.0, 0.0), (1.0, 1.0)], 16, 0.01);
+        let (goals, expected) = decided_goals_and_predictions([(1.0, 0.0), (1.0, 1.0)], 16, 0.01);
         assert_eq!(goals.get(0, 0), u32::MAX, "no goal should be decided");
         assert!((64..1000).contains(&expected.of_cell_half(0, 0)), "{}", expected.of_cell_half(0, 0));
     }
@@ -173,7 +172,7 @@ mod tests {
         // samples, the slow decrease in noise is not yet apparent, but each doubling improves the prediction.
         // The expected predictions are 80, 190 and 260. With 64 pixels, their error is about 20 %.
         for (samples, expected) in [(2, 80.0), (4, 190.0), (8, 260.0)] {
-            let (goals, expected_samples) = decided_goals([(1.0, 1.0); 2], samples, 0.01);
+            let (goals, expected_samples) = decided_goals_and_predictions([(1.0, 1.0); 2], samples, 0.01);
             assert_eq!(goals.get(0, 0), u32::MAX, "no goal should be decided");
             let ratio = f64::from(expected_samples.of_cell_half(0, 0)) / expected;
             assert!((0.6..1.6).contains(&ratio), "{samples}: {}", expected_samples.of_cell_half(0, 0));
@@ -213,7 +212,7 @@ mod tests {
     #[test]
     fn huge_predictions_differ_from_unknown() {
         for samples in [2, 16, 64] {
-            let (goals, expected) = decided_goals([(1.0, 1.0); 2], samples, 1e-12);
+            let (goals, expected) = decided_goals_and_predictions([(1.0, 1.0); 2], samples, 1e-12);
             assert_eq!((goals.get(0, 0), expected.of_cell_half(0, 0)), (u32::MAX, MAX_SAMPLES), "{samples}");
         }
     }

@@ -9,7 +9,7 @@ use crate::integrators::transport::interiors::{InteriorListPool, medium_transmit
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::view::PathAov;
 use crate::lights::{
-    EmissionModulation, EmitterObjectPacket, GeometryOfLight, Light, LightCenter, LightSamplePacket,
+    EmissionModulation, GeometryOfLight, GeometryOfLightPacket, Light, LightCenter, LightSamplePacket,
 };
 use crate::materials::bsdf::divide_lanes_or_zero;
 use crate::math::Vec3;
@@ -257,7 +257,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             .with_start_triangles(self.row.ray_start_triangles(&direction));
         self.trace_and_add_light(
             (&rays, &ends, traced),
-            &EmitterObjectPacket::splat(source),
+            &GeometryOfLightPacket::splat(source),
             (&pending.light, fraction.as_ref()),
             sums,
             simd,
@@ -270,7 +270,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     pub fn trace_and_add_light(
         &self,
         (rays, ends, traced): (&RayPacket, &F32x16, u32),
-        sources: &EmitterObjectPacket,
+        sources: &GeometryOfLightPacket,
         (values, fraction): (&Vec3x16, Option<&Vec3x16>),
         sums: &mut LightSums,
         simd: impl Simd,
@@ -296,7 +296,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     fn add_attenuated_light(
         &self,
         (rays, ends, traced): (&RayPacket, &F32x16, u32),
-        sources: &EmitterObjectPacket,
+        sources: &GeometryOfLightPacket,
         (values, fraction): (&Vec3x16, Option<&Vec3x16>),
         sums: &mut LightSums,
     ) {

@@ -294,8 +294,8 @@ impl TileContext<'_> {
         sum
     }
 
-    /// Like [`TileContext::emitter_mis_weight`], for an emitter that coincides with glass. Returns 1 if shadow
-    /// rays cannot reach the hit point.
+    /// Like [`TileContext::emitter_mis_weight`], for an emitter that coincides with glass. Returns 1 if
+    /// shadow rays cannot reach the hit point.
     pub fn coincident_glass_emitter_mis_weight(&self, path: &PathRay, hit: &Hit) -> f32 {
         let Ray { origin, direction, .. } = path.ray;
         let shadow = Ray::segment_ending_before_point(origin, origin + direction * hit.shape.t);

@@ -111,7 +111,7 @@ impl DirectLightVertexQueue {
     }
 
     /// Like [`DirectLightVertexQueue::accumulate_arrived_light`], for paths with consecutive slots.
-    pub fn accumulate_in_consecutive_slots(&mut self, first: u32, accumulator: &mut Accumulator<'_>) {
+    pub fn accumulate_arrived_light_in_slots(&mut self, first: u32, accumulator: &mut Accumulator<'_>) {
         accumulator.add_direct_to_consecutive_slots(first, &self.arrived, &self.arrived_diffuse);
     }
 

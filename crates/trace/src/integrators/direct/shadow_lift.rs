@@ -3,7 +3,7 @@
 use crate::geometry::Ray;
 use crate::geometry::packet::{RayPacket, nonnegative_end_mask};
 use crate::integrators::transport::batch::VertexBatch;
-use crate::lights::{EmitterObjectPacket, GeometryOfLight};
+use crate::lights::{GeometryOfLight, GeometryOfLightPacket};
 use crate::math::lanes::{PACKET_SIZE, Simd, mask_from_bits, select, select_u32};
 use crate::world::{Geometry, SimdKernel};
 
@@ -36,7 +36,7 @@ impl SimdKernel for ShadowOriginLiftKernel<'_> {
         // Find the occluded rays.
         let blocked = {
             let (traced, nothing) =
-                (nonnegative_end_mask(&ends, simd), EmitterObjectPacket::splat(GeometryOfLight::Nothing));
+                (nonnegative_end_mask(&ends, simd), GeometryOfLightPacket::splat(GeometryOfLight::Nothing));
             geometry.occluded_ray_mask(&rays, &ends, traced, &nothing, simd)
         };
         // Move the origins of the unoccluded rays.

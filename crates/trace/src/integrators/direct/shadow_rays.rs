@@ -6,7 +6,7 @@ use super::light_sums::{LightSums, add_masked_lane_products, add_masked_lanes};
 use crate::geometry::packet::{F32x16, RayPacket, set_bit_lanes};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::view::PathAov;
-use crate::lights::{EmitterObjectPacket, GeometryOfLight};
+use crate::lights::{GeometryOfLight, GeometryOfLightPacket};
 use crate::math::lanes::{PACKET_SIZE, Simd, Vec3x16, lane, set_lane};
 use crate::world::{SimdKernel, World};
 
@@ -19,7 +19,7 @@ struct QueuedShadowRays {
     ends: F32x16,
     /// Mask of rays to trace.
     traced: u32,
-    sources: EmitterObjectPacket,
+    sources: GeometryOfLightPacket,
     values: Vec3x16,
     /// Whether [`ShadowRayQueue::fractions`] contains the fractions of `values` from wide lobes.
     has_fraction: bool,
@@ -56,7 +56,7 @@ impl ShadowRayQueue {
         &mut self,
         row: u32,
         (rays, ends, traced): (RayPacket, F32x16, u32),
-        sources: &EmitterObjectPacket,
+        sources: &GeometryOfLightPacket,
         (values, fraction): (&Vec3x16, Option<&Vec3x16>),
         places: &[u32; PACKET_SIZE],
     ) {
@@ -140,7 +140,7 @@ impl SimdKernel for ShadowRayKernel<'_> {
         for rays in rays.chunks(PACKET_SIZE) {
             let mut packet = RayPacket::from_soa([[0.0; PACKET_SIZE]; 3], [[0.0; PACKET_SIZE]; 3]);
             let mut ends = [-1.0; PACKET_SIZE];
-            let mut sources = EmitterObjectPacket::splat(GeometryOfLight::Nothing);
+            let mut sources = GeometryOfLightPacket::splat(GeometryOfLight::Nothing);
             for (to, &ray) in rays.iter().enumerate() {
                 let (row, from) = (&rows[ray as usize / PACKET_SIZE], ray as usize % PACKET_SIZE);
                 for axis in 0..3 {
@@ -173,7 +173,7 @@ fn attenuate_queued_contributions(
     world: &World,
     aov: PathAov,
     (packet, ends, traced): (&RayPacket, &F32x16, u32),
-    sources: &EmitterObjectPacket,
+    sources: &GeometryOfLightPacket,
     (rows, rays): (&mut [QueuedShadowRays], &[u32]),
 ) -> u32 {
     let weakened = world.transmittance_packet(packet, ends, traced, sources);

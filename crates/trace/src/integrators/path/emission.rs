@@ -96,7 +96,7 @@ impl CameraPathWavefront<'_, '_> {
     }
 
     /// Adds the emission of a surface and returns whether the path may scatter at the surface.
-    pub(super) fn add_emission_and_may_scatter(
+    pub(super) fn add_emission_and_check_depth(
         &mut self,
         path: &PathRay,
         vertex: &SurfaceVertex<'_>,

@@ -49,7 +49,7 @@ impl<'a> PathStepper<'a> for CameraPathWavefront<'a, '_> {
                 if !has_passed && matches!(hit, OpaqueSurfaceHit::Direct(_)) {
                     self.record_camera_vertex(path, vertex);
                 }
-                if self.add_emission_and_may_scatter(path, vertex, hit) && vertex.scatters() {
+                if self.add_emission_and_check_depth(path, vertex, hit) && vertex.scatters() {
                     match &vertex.material.bsdf {
                         Bsdf::NonSpecular(rough) => self.shade_non_specular(path, vertex, rough, far),
                         Bsdf::Mirror(mirror) => self.shade_mirror_hit(path, vertex, mirror),
@@ -65,7 +65,7 @@ impl<'a> PathStepper<'a> for CameraPathWavefront<'a, '_> {
                 if !has_passed {
                     self.record_camera_vertex(path, vertex);
                 }
-                if self.add_emission_and_may_scatter(path, vertex, OpaqueSurfaceHit::Direct(hit)) {
+                if self.add_emission_and_check_depth(path, vertex, OpaqueSurfaceHit::Direct(hit)) {
                     match rough {
                         Some(rough) => self.queue_rough_glass_vertices(path, vertex, rough, far),
                         None => self.shade_glass_hit(path, vertex, far),
@@ -93,7 +93,7 @@ impl<'a> PathStepper<'a> for CameraPathWavefront<'a, '_> {
         let tint = vertex.pane_transmittance(path, pane, &mut self.counters.texture_lookups);
         let left = tint * (1.0 - reflectance);
         // After the last bounce, only light that passes straight through the pane is added.
-        if !self.add_emission_and_may_scatter(path, vertex, hit) {
+        if !self.add_emission_and_check_depth(path, vertex, hit) {
             return NullInteractionOutcome::Passed(left);
         }
         let shading = vertex.perturbed_and_smooth_normals(self.counters);

@@ -169,7 +169,7 @@ impl KernelNeighborhood {
     fn add_shape(&mut self, shape: &Shape, receives: impl Fn(bool) -> bool) -> bool {
         match shape.polygons_or_surface_near(self.point) {
             NearbyGeometry::Polygons(count) => (0..count)
-                .filter_map(|number| shape.polygon_face_at(number))
+                .filter_map(|number| shape.nth_polygon_face(number))
                 .all(|piece| self.add_polygon_piece_or_wall(piece, &receives)),
             NearbyGeometry::Surface { distance, ground } => {
                 distance > SEARCH_RADIUS * self.radius

@@ -2,7 +2,7 @@
 
 use super::batch::{UNPERTURBED, VertexBatch};
 use super::packet_source::PacketSource;
-use super::vertex::is_lift_significant_and_segment_t_max;
+use super::vertex::lift_significance_and_t_max;
 use crate::geometry::Ray;
 use crate::geometry::packet::RayPacket;
 use crate::geometry::ray::offset_origin;
@@ -54,7 +54,7 @@ impl VertexBatch {
         for i in 0..PACKET_SIZE {
             let (from, to) = (lane(&self.from, i), lane(&surface.shadow_point, i));
             let (is_above, end) =
-                is_lift_significant_and_segment_t_max(from, to, lane(&facets, i), lane(&surface.error, i));
+                lift_significance_and_t_max(from, to, lane(&facets, i), lane(&surface.error, i));
             above[i] = if is_above { TRUE } else { 0 };
             ends[i] = end;
         }

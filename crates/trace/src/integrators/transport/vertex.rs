@@ -337,8 +337,7 @@ impl<'a> SurfaceVertex<'a> {
         }
         let on_facet = offset_origin(point, error, self.normal, self.normal);
         let is_traced = tile.settings.render.shadows != ShadowMode::Off;
-        let (is_above, end) =
-            is_lift_significant_and_segment_t_max(on_facet, shadow_point, self.normal, error);
+        let (is_above, end) = lift_significance_and_t_max(on_facet, shadow_point, self.normal, error);
         if is_above && !is_traced {
             return ShadowOrigin { point: shadow_point, start: Ray::NO_TRIANGLE, horizon: None, lift: None };
         }
@@ -372,12 +371,7 @@ fn choose_blend_part<'a>(
 /// Returns whether the distance from a facet to the lifted point `to` is significant. Also returns the
 /// segment's `t_max`: 1 at the point, plus a margin for the error.
 #[inline(always)]
-pub fn is_lift_significant_and_segment_t_max(
-    on_facet: Vec3,
-    to: Vec3,
-    normal: Vec3,
-    error: Vec3,
-) -> (bool, f32) {
+pub fn lift_significance_and_t_max(on_facet: Vec3, to: Vec3, normal: Vec3, error: Vec3) -> (bool, f32) {
     let lift = Ray { t_max: 1.0, ..Ray::new(on_facet, to - on_facet) };
     let is_above = lift.direction.dot(normal) > MIN_LIFT * normal.abs().dot(error);
     (is_above, lift.extended_by_endpoint_error(error).t_max)

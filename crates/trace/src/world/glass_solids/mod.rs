@@ -100,7 +100,7 @@ impl GlassSolids {
         let alone = |place| ObjectRoleInSolid { place, is_inside_out: false, is_open: false };
         solids.parts = (0..scene.objects.len() as u32).map(alone).collect();
         let all = groups.parts_by_solid();
-        let holes = SurfaceGap::find_per_solid(&parts, &groups, &all, &shared_edges);
+        let holes = SurfaceHole::find_per_solid(&parts, &groups, &all, &shared_edges);
         let covered = opaque_cover_flag_per_hole(scene, meshes, &parts, &holes, token)?;
         let mut closed: Vec<ClosedSolid> = Vec::new();
         for ((members, hole), &is_covered) in all.iter().zip(&holes).zip(&covered) {
@@ -184,14 +184,14 @@ fn opaque_cover_flag_per_hole(
     scene: &Scene,
     meshes: &[&LoadedMesh],
     parts: &GlassParts,
-    holes: &[SurfaceGap],
+    holes: &[SurfaceHole],
     token: &CancelToken,
 ) -> Result<Vec<bool>, Canceled> {
-    let is_large = |hole: &&SurfaceGap| hole.part > SMALL_HOLE;
+    let is_large = |hole: &&SurfaceHole| hole.part > SMALL_HOLE;
     let rims: Vec<&[RimEdge]> = holes.iter().filter(is_large).map(|hole| &*hole.rims).collect();
     let mut parts = caps::covered_rim_fractions(scene, meshes, parts, &rims, token)?.into_iter();
     let is_covered =
-        |hole: &SurfaceGap| is_large(&hole) && parts.next().is_some_and(|part| part >= MIN_COVERED_FRACTION);
+        |hole: &SurfaceHole| is_large(&hole) && parts.next().is_some_and(|part| part >= MIN_COVERED_FRACTION);
     Ok(holes.iter().map(is_covered).collect())
 }
 
@@ -309,7 +309,7 @@ impl PartGroups {
 }
 
 /// Missing part of a solid's surface.
-struct SurfaceGap {
+struct SurfaceHole {
     rims: Vec<RimEdge>,
     /// For each edge, whether another edge of the solid coincides with it and has the same direction.
     disagree: Vec<bool>,
@@ -317,7 +317,7 @@ struct SurfaceGap {
     part: f64,
 }
 
-impl SurfaceGap {
+impl SurfaceHole {
     /// Returns the holes of all solids.
     fn find_per_solid(
         parts: &GlassParts,

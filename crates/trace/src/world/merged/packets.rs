@@ -1,5 +1,5 @@
-//! Packets of rays against merged meshes. If the rays are incoherent and there are few triangles, all triangles
-//! are tested. In other cases, the tree is traversed.
+//! Packets of rays against merged meshes. If the rays are incoherent and there are few triangles, all
+//! triangles are tested. In other cases, the tree is traversed.
 
 use super::MergedMeshes;
 use crate::accel::{F32x16, InstructionSet, PACKET_SIZE, SimdKernel};
@@ -136,8 +136,8 @@ fn are_rays_coherent(rows: &RayPacket, active: u32, size: Vec3, simd: impl Simd)
 /// between directions relative to their length.
 const COHERENCE: f32 = 0.125;
 
-/// Kernel that calls [`BruteForceTriangles::update_decided_closest_hits`] for incoherent rays and returns the lanes
-/// that need an exact test, or returns `None` for coherent rays.
+/// Kernel that calls [`BruteForceTriangles::update_decided_closest_hits`] for incoherent rays and returns the
+/// lanes that need an exact test, or returns `None` for coherent rays.
 struct TriangleListClosestHitKernel<'a> {
     facets: &'a BruteForceTriangles,
     size: Vec3,
@@ -160,8 +160,8 @@ impl SimdKernel for TriangleListClosestHitKernel<'_> {
     }
 }
 
-/// Kernel that calls [`BruteForceTriangles::any_hit_and_undecided_masks`] for incoherent rays and returns the hit
-/// lanes and the lanes that need an exact test, or returns `None` for coherent rays.
+/// Kernel that calls [`BruteForceTriangles::any_hit_and_undecided_masks`] for incoherent rays and returns the
+/// hit lanes and the lanes that need an exact test, or returns `None` for coherent rays.
 struct TriangleListAnyHitKernel<'a> {
     facets: &'a BruteForceTriangles,
     size: Vec3,

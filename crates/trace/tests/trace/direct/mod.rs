@@ -79,7 +79,8 @@ impl Estimate {
         self.assert_same(what, Self { mean: exact, error: 0.0 }, max_relative_error);
     }
 
-    /// Checks that the difference to another estimate is precise, and that it is at most four standard errors.
+    /// Checks that the difference to another estimate is precise, and that it is at most four standard
+    /// errors.
     #[track_caller]
     pub fn assert_same(self, what: &str, other: Self, max_relative_error: f64) {
         let error = self.error.hypot(other.error);
@@ -100,8 +101,8 @@ pub struct LitScene {
 }
 
 impl LitScene {
-    /// Creates a scene with vertices of this material. `settings` are lines of the `[render]` table. Each lane
-    /// takes `samples` samples.
+    /// Creates a scene with vertices of this material. `settings` are lines of the `[render]` table. Each
+    /// lane takes `samples` samples.
     pub fn new(settings: &str, material: &str, light: &ReferenceLight, samples: u32) -> Self {
         let text = format!(
             "[render]\n{settings}\n[camera]\nposition = [0, 5, 9]\nlook_at = [0, 0, 0]\n\

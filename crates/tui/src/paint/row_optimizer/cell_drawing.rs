@@ -9,7 +9,7 @@ use crate::mosaic::{PLACES, TwoPartBlockPattern};
 
 /// A color that may be set before drawing a cell, and its cost.
 #[derive(Clone, Copy)]
-struct ColorCandidate {
+struct ColorChange {
     shade: TerminalColor,
     /// Number of bytes in the SGR parameters.
     bytes: u32,
@@ -21,7 +21,7 @@ struct ColorCandidate {
 pub(super) struct ColorChangesToTry {
     mosaic: TwoPartColorCell,
     model: RateDistortionParameters,
-    all: Vec<ColorCandidate>,
+    all: Vec<ColorChange>,
     /// End index of the colors for the first part. Colors for the second part follow, up to `second`.
     first: usize,
     second: usize,
@@ -36,7 +36,7 @@ impl ColorChangesToTry {
         let PartColorCandidates { first, second, both } = candidates;
         let mut changes =
             Self { mosaic, model, all: Vec::new(), first: first.len(), second: first.len() + second.len() };
-        let change = |shade: &TerminalColor| ColorCandidate {
+        let change = |shade: &TerminalColor| ColorChange {
             shade: *shade,
             bytes: shade.sgr_length(),
             errors: changes.color_error_per_part(*shade),
@@ -163,15 +163,15 @@ struct PenWithErrors {
 }
 
 impl PenWithErrors {
-    fn from_changes(fg: &ColorCandidate, bg: &ColorCandidate) -> Self {
+    fn from_changes(fg: &ColorChange, bg: &ColorChange) -> Self {
         Self { fg: fg.shade, fg_errors: fg.errors, bg: bg.shade, bg_errors: bg.errors }
     }
 
-    fn with_fg(self, change: &ColorCandidate) -> Self {
+    fn with_fg(self, change: &ColorChange) -> Self {
         Self { fg: change.shade, fg_errors: change.errors, ..self }
     }
 
-    fn with_bg(self, change: &ColorCandidate) -> Self {
+    fn with_bg(self, change: &ColorChange) -> Self {
         Self { bg: change.shade, bg_errors: change.errors, ..self }
     }
 

@@ -14,7 +14,7 @@ use crate::math::Vec3;
 use crate::math::color::srgb_to_linear;
 
 /// Converts an image to alpha-weighted texels, or to plain texels if it is opaque.
-pub(super) fn texels_with_alpha(
+pub(super) fn cutout_texels(
     image: DynamicImage,
     curve: ColorTransferFunction,
     metadata: &ImageColorMetadata,

@@ -171,7 +171,7 @@ pub(super) fn image_to_texels(
         ColorEncoding::Number { of, is_srgb } => {
             return scalars::scalar_texels(&image, of, is_srgb, metadata);
         }
-        ColorEncoding::CutOut(curve) => return cutout::texels_with_alpha(image, curve, metadata),
+        ColorEncoding::CutOut(curve) => return cutout::cutout_texels(image, curve, metadata),
         ColorEncoding::Color | ColorEncoding::Srgb | ColorEncoding::Linear | ColorEncoding::Raw => {}
     }
     let (width, height) = (image.width(), image.height());

@@ -63,7 +63,7 @@ impl<R: BufRead + Seek> ExrDecoder<R> {
             ImageColorMetadata { alpha: AlphaInterpretation::Premultiplied, ..ImageColorMetadata::default() };
         if let Some(primaries) = primaries(self.header()) {
             match primaries.to_rec_709_matrix() {
-                Some(matrix) => metadata.space = ColorSpace::from_rec_709_matrix(matrix),
+                Some(matrix) => metadata.space = ColorSpace::from_matrix_to_rec_709(matrix),
                 None => metadata.add_warning(DEGENERATE_CHROMATICITIES),
             }
         }
@@ -169,7 +169,7 @@ impl<R: BufRead + Seek> ImageDecoder for ExrDecoder<R> {
     }
 }
 
-/// A partially decoded image.
+/// Assembles an image from decompressed blocks.
 struct BlockAssembler<'a> {
     headers: &'a [Header],
     channels: ChosenChannels,

@@ -53,7 +53,7 @@ fn material_warnings(found: &MtlMaterial) -> Vec<MtlWarning> {
     };
     warn_about_approximations(found, &converted, &mut add);
     warn_about_opacity(found, &converted, &mut add);
-    warn_about_unrenderable_reflectance(found, &converted, &mut add);
+    warn_about_altered_reflectance(found, &converted, &mut add);
     warn_about_ineffective_pbr(found, &converted, &mut add);
     for (kind, map) in &found.maps {
         warn_about_map(found, &converted, *kind, map, &mut add);
@@ -179,7 +179,7 @@ fn warn_about_opacity(
 }
 
 /// Warns about reflectances that cannot be rendered as specified.
-fn warn_about_unrenderable_reflectance(
+fn warn_about_altered_reflectance(
     found: &MtlMaterial,
     converted: &FileMaterial,
     add: &mut impl FnMut(Option<usize>, &str),

@@ -71,7 +71,7 @@ impl PlyColorCollector {
         };
         let transparent = self.alpha.filter(|(least, scalar, _)| *least < one(*scalar));
         let outside = self.scalars.iter().zip(&self.extremes).find_map(|(scalar, extremes)| {
-            let fraction = extremes.dropped_fraction_warning().filter(|_| scalar.is_integer());
+            let fraction = extremes.fraction_in_integer_color_warning().filter(|_| scalar.is_integer());
             extremes.out_of_range_color_warning(one(*scalar)).or(fraction)
         });
         let mut warnings: Vec<_> = outside.into_iter().collect();

@@ -25,7 +25,7 @@ pub(super) fn parse(source: &MeshFileBytes<'_>) -> Result<LoadedMesh, AssetError
     let header = header::parse(source)?;
     let (bytes, at) = (source.bytes, header.body);
     match header.encoding {
-        Encoding::Ascii => read_text_bytes(source, &header),
+        Encoding::Ascii => read_ascii_body(source, &header),
         Encoding::LittleEndian => read_body(source, &header, &mut BinaryReader::<false> { bytes, at }),
         Encoding::BigEndian => read_body(source, &header, &mut BinaryReader::<true> { bytes, at }),
     }
@@ -33,7 +33,7 @@ pub(super) fn parse(source: &MeshFileBytes<'_>) -> Result<LoadedMesh, AssetError
 
 /// Reads a text file, ignoring line ends. If this fails or leaves words unread, some lines may contain
 /// undeclared values, so the file is read again with one item per line.
-fn read_text_bytes(source: &MeshFileBytes<'_>, header: &PlyHeader) -> Result<LoadedMesh, AssetError> {
+fn read_ascii_body(source: &MeshFileBytes<'_>, header: &PlyHeader) -> Result<LoadedMesh, AssetError> {
     let cursor = TextCursor::new(source.bytes, header.body);
     let mut words = AsciiReader(cursor, LineEndMode::Blank);
     let by_words = read_body(source, header, &mut words);

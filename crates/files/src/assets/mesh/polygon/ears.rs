@@ -118,24 +118,24 @@ impl<'a, F: FnMut([usize; 3])> EarClipper<'a, F> {
         self.points[corner as usize]
     }
 
-    fn corner_between_neighbors(&self, corner: u32) -> [u32; 3] {
+    fn corner_with_neighbors(&self, corner: u32) -> [u32; 3] {
         [self.previous[corner as usize], corner, self.next[corner as usize]]
     }
 
     fn is_convex(&self, corner: u32) -> bool {
-        let [a, b, c] = self.corner_between_neighbors(corner).map(|corner| self.point(corner));
+        let [a, b, c] = self.corner_with_neighbors(corner).map(|corner| self.point(corner));
         twice_signed_area(a, b, c) > 0.0
     }
 
     /// Whether the outline reverses direction at a corner.
     fn is_spike(&self, corner: u32) -> bool {
-        let [a, b, c] = self.corner_between_neighbors(corner).map(|corner| self.point(corner));
+        let [a, b, c] = self.corner_with_neighbors(corner).map(|corner| self.point(corner));
         twice_signed_area(a, b, c) == 0.0 && (a - b).dot(c - b) >= 0.0
     }
 
     /// Removes a corner, and emits its triangle unless the triangle has zero area.
     fn clip_corner(&mut self, corner: u32) {
-        let [a, b, c] = self.corner_between_neighbors(corner);
+        let [a, b, c] = self.corner_with_neighbors(corner);
         if self.is_convex(b) {
             (self.emit)([a, b, c].map(|corner| corner as usize));
         }
@@ -186,7 +186,7 @@ impl<'a, F: FnMut([usize; 3])> EarClipper<'a, F> {
         if self.visits > self.max_visits {
             return None;
         }
-        let around = self.corner_between_neighbors(corner);
+        let around = self.corner_with_neighbors(corner);
         let triangle = around.map(|corner| self.point(corner));
         let mut visits = self.visits;
         let found = self.tree.search_near_triangle(triangle, &mut visits, |other| {

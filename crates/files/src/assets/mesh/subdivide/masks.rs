@@ -25,9 +25,10 @@ pub(super) fn neighbor_weight(count: u32) -> f64 {
     (0.625 - center * center) / n
 }
 
-/// Weight of the far end of an edge in a wide fan with this many faces around the near end, whose weight is 3/4
-/// minus this one. Across the boundary, the largest eigenvalue becomes 1/2, as along the boundary (Biermann,
-/// Levin and Zorin, *Piecewise Smooth Subdivision Surfaces with Normal Control*, SIGGRAPH 2000, section 3.2).
+/// Weight of the far end of an edge in a wide fan with this many faces around the near end, whose weight is
+/// 3/4 minus this one. Across the boundary, the largest eigenvalue becomes 1/2, as along the boundary
+/// (Biermann, Levin and Zorin, *Piecewise Smooth Subdivision Surfaces with Normal Control*, SIGGRAPH 2000,
+/// section 3.2).
 fn wide_fan_edge_weight(faces: u32) -> f64 {
     0.5 - 0.25 * libm::cos(PI / f64::from(faces))
 }
@@ -90,8 +91,8 @@ fn refined_edge_value<T: VertexValue>(topology: &Topology, values: &[T], half: u
     ends + wings * 0.125
 }
 
-/// Value on the limit surface. `index` is as in [`refined_value`], and `refined` contains the values after the
-/// refinement.
+/// Value on the limit surface. `index` is as in [`refined_value`], and `refined` contains the values after
+/// the refinement.
 pub(super) fn limit_value<T: VertexValue>(topology: &Topology, refined: &[T], index: usize) -> T {
     let value = refined[index];
     let Some(edge) = index.checked_sub(topology.vertex_count()) else {

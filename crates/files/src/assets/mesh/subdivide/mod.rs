@@ -1,8 +1,8 @@
 //! Loop subdivision. Vertices are moved to their limit positions and get the normals of the limit surface.
 //!
 //! Vertices at the same position are a single control point, even if their normals or texture coordinates
-//! differ. Texture coordinates and colors are subdivided with the same masks. Where they are discontinuous, they
-//! have boundaries of their own, which do not affect the shape.
+//! differ. Texture coordinates and colors are subdivided with the same masks. Where they are discontinuous,
+//! they have boundaries of their own, which do not affect the shape.
 //!
 //! All values are sums in a fixed order, computed in `f64`, so they do not depend on the number of threads.
 
@@ -162,7 +162,8 @@ fn refine_values<T: VertexValue>(
     })
 }
 
-/// Converted values on the limit surface, from the values after the last refinement. An empty list stays empty.
+/// Converted values on the limit surface, from the values after the last refinement. An empty list stays
+/// empty.
 fn converted_limit_values<T: VertexValue, U: Send>(
     topology: &Topology,
     refined: &[T],

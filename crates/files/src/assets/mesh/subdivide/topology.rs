@@ -119,8 +119,8 @@ impl Topology {
         Ok((topology, improper))
     }
 
-    /// Returns the connectivity of other vertices at the same corners. Faces remain connected across an edge if
-    /// they have the same vertices there.
+    /// Returns the connectivity of other vertices at the same corners. Faces remain connected across an edge
+    /// if they have the same vertices there.
     pub(super) fn with_replaced_vertices(&self, triangles: Vec<[u32; 3]>, vertices: usize) -> Self {
         let mut other = Self {
             twins: vec![[NONE; 3]; triangles.len()],
@@ -243,7 +243,8 @@ impl Topology {
         self.corners.get(vertex as usize).copied().unwrap_or(false)
     }
 
-    /// Whether a vertex on a boundary or crease has a large fan of faces, whose inner edges need special masks.
+    /// Whether a vertex on a boundary or crease has a large fan of faces, whose inner edges need special
+    /// masks.
     pub(super) fn has_wide_fan_at(&self, vertex: u32) -> bool {
         self.wide.get(vertex as usize).copied().unwrap_or(false)
     }
@@ -304,7 +305,7 @@ impl Topology {
     pub(super) fn refined(self, work: ParallelMapper<'_>) -> Result<Self, AssetError> {
         let triangles = self.refined_triangles(work)?;
         let (faces, first) = (self.triangles.len(), 2 * self.edge_count() as u32);
-        let twins = work.map_indices(faces, |face| self.twins_of_children(face as u32))?.into_flattened();
+        let twins = work.map_indices(faces, |face| self.twins_of_child_faces(face as u32))?.into_flattened();
         let edges =
             work.map_indices(faces, |face| self.edges_of_child_faces(face as u32, first))?.into_flattened();
         let edge_halves =
@@ -328,7 +329,7 @@ impl Topology {
         Ok(Self { triangles, twins, edges, edge_halves, vertex_halves, corners, wide })
     }
 
-    fn twins_of_children(&self, face: u32) -> [[u32; 3]; 4] {
+    fn twins_of_child_faces(&self, face: u32) -> [[u32; 3]; 4] {
         let twins = self.twins[face as usize];
         let of_outgoing = |twin| if twin == NONE { NONE } else { incoming_child(twin) };
         let of_incoming = |twin| if twin == NONE { NONE } else { outgoing_child(twin) };

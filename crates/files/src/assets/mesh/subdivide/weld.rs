@@ -9,8 +9,8 @@ use crate::geometry::mesh::TriangleMesh;
 use crate::math::color::srgb8_color_to_linear;
 use crate::math::{DVec2, DVec3, Vec2};
 
-/// Number of vertices of a fan with which the attributes of a corner are compared. In a fan with more distinct
-/// attributes, some edges become unnecessary seams.
+/// Number of vertices of a fan with which the attributes of a corner are compared. In a fan with more
+/// distinct attributes, some edges become unnecessary seams.
 const COMPARED: usize = 64;
 
 /// Control points and attributes of a mesh.
@@ -32,8 +32,8 @@ pub(super) struct ControlMesh {
 }
 
 impl ControlMesh {
-    /// Welds the vertices of a mesh that coincide. Drops triangles with coincident corners and vertices without
-    /// triangles.
+    /// Welds the vertices of a mesh that coincide. Drops triangles with coincident corners and vertices
+    /// without triangles.
     pub(super) fn weld(mesh: &mut TriangleMesh, work: ParallelMapper<'_>) -> Result<Self, AssetError> {
         let (triangles, sources) = weld_triangles(mesh, work)?;
         let points: Vec<DVec3> =
@@ -68,9 +68,9 @@ fn gather_and_convert<T: Copy, U>(values: &[T], vertices: &[u32], convert: impl 
     vertices.iter().map(|vertex| convert(values[*vertex as usize])).collect()
 }
 
-/// Returns the triangles with welded vertices, and the first of the mesh's vertices for each welded vertex, in
-/// the order of the corners. This order is independent of how a file splits its vertices. Removes triangles
-/// with coincident corners from the mesh.
+/// Returns the triangles with welded vertices, and the first of the mesh's vertices for each welded vertex,
+/// in the order of the corners. This order is independent of how a file splits its vertices. Removes
+/// triangles with coincident corners from the mesh.
 fn weld_triangles(
     mesh: &mut TriangleMesh,
     work: ParallelMapper<'_>,

@@ -59,7 +59,7 @@ impl Simd for Avx2Simd {
     #[inline(always)]
     fn min_max(self, row: &F32x16, of: u32) -> [f32; 2] {
         // SAFETY: as above.
-        unsafe { avx2_masked_min_max(row, of) }
+        unsafe { avx2_min_max_of_lanes(row, of) }
     }
 
     #[inline(always)]
@@ -155,7 +155,7 @@ fn horizontal_min_max(low: __m256, high: __m256) -> [f32; 2] {
 #[cfg(target_arch = "x86_64")]
 #[inline]
 #[target_feature(enable = "avx2")]
-fn avx2_masked_min_max(row: &F32x16, of: u32) -> [f32; 2] {
+fn avx2_min_max_of_lanes(row: &F32x16, of: u32) -> [f32; 2] {
     let other = _mm256_set1_ps(row[of.trailing_zeros() as usize % PACKET_SIZE]);
     let lanes = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
     let (low, high) = row.split_at(PACKET_SIZE / 2);

@@ -76,8 +76,8 @@ impl SkyFrame {
     }
 }
 
-/// Radiance of the sky above the horizon, and of a uniform diffuse ground below it. Directions are sampled from
-/// cells with equal ranges of azimuth and height. The last row of cells is the ground.
+/// Radiance of the sky above the horizon, and of a uniform diffuse ground below it. Directions are sampled
+/// from cells with equal ranges of azimuth and height. The last row of cells is the ground.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SkyDome {
     channels: [SkyChannel; 3],

@@ -77,8 +77,8 @@ impl Plastic {
         Self { diffuse, specular, roughness, ior, albedos, is_linear: false }
     }
 
-    /// Makes the reflectance of the base proportional to kd, as if the light that the coat reflects back met a
-    /// white base. Colors do not become more saturated.
+    /// Makes the reflectance of the base proportional to kd, as if the light that the coat reflects back met
+    /// a white base. Colors do not become more saturated.
     #[must_use]
     pub fn with_linear_base(self) -> Self {
         Self { is_linear: true, ..self }

@@ -37,7 +37,7 @@ impl<'a> SceneReader<'a> {
             keys.push(("anisotropy", shorten_number(signed.clamp(-1.0, 1.0)).into()));
         } else if signed != 0.0 {
             let text = "replaced by its mean";
-            self.notes.substitute_changing_lighting(
+            self.notes.note_lighting_substitution(
                 "anisotropic roughness of glass",
                 text,
                 object.span.clone(),
@@ -81,8 +81,8 @@ impl<'a> SceneReader<'a> {
         Some((cells, self.find_or_add_texture_table(keys, "cells", [board.span.clone(), board.span.clone()])))
     }
 
-    /// Converts a conductor whose `alpha_u` or `alpha_v` is a checkerboard to a blend of two metals. `keys` are
-    /// the other keys of the metals.
+    /// Converts a conductor whose `alpha_u` or `alpha_v` is a checkerboard to a blend of two metals. `keys`
+    /// are the other keys of the metals.
     pub(super) fn checkered_metal(
         &mut self,
         keys: &TableEntries,

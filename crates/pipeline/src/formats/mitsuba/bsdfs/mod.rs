@@ -4,7 +4,7 @@ mod checkered;
 mod nested;
 mod surfaces;
 
-use super::graph::{Child, NodeIndex, ObjectKind, PluginInstance};
+use super::graph::{Child, GraphObjectIndex, ObjectKind, PluginInstance};
 use super::material_key::{MaterialKey, UvFlips};
 use super::reader::{ColorRole, ColorSource, NumberSource, SceneReader, luminance};
 use super::textures::MitsubaTextureUse;
@@ -53,9 +53,9 @@ pub(super) struct BsdfContext {
     /// Whether a `twosided` contains the BSDF.
     is_two_sided: bool,
     /// The `mask` that contains the BSDF.
-    mask: Option<NodeIndex>,
+    mask: Option<GraphObjectIndex>,
     /// The `coating` that contains the BSDF.
-    coat: Option<NodeIndex>,
+    coat: Option<GraphObjectIndex>,
     depth: u32,
 }
 
@@ -100,7 +100,7 @@ impl<'a> SceneReader<'a> {
     pub(super) fn material(
         &mut self,
         bsdf: Option<&'a Child>,
-        emitter: Option<NodeIndex>,
+        emitter: Option<GraphObjectIndex>,
         uv: UvFlips,
         shape: &'a PluginInstance,
     ) -> Option<String> {
@@ -162,7 +162,7 @@ impl<'a> SceneReader<'a> {
     fn add_emission(
         &mut self,
         builder: &mut MaterialBuilder,
-        emitter: NodeIndex,
+        emitter: GraphObjectIndex,
         uv: UvFlips,
         shape: &'a PluginInstance,
     ) {
@@ -170,11 +170,7 @@ impl<'a> SceneReader<'a> {
         let emitter = self.object_by_index(index);
         if builder.is_blend {
             let text = "the shape does not emit";
-            self.notes.substitute_changing_lighting(
-                "an area light on a `blendbsdf`",
-                text,
-                shape.span.clone(),
-            );
+            self.notes.note_lighting_substitution("an area light on a `blendbsdf`", text, shape.span.clone());
             return;
         }
         if builder.is_invisible {
@@ -206,7 +202,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Converts a BSDF. Returns `None` after an error.
-    fn bsdf(&mut self, index: NodeIndex, context: BsdfContext) -> Option<MaterialBuilder> {
+    fn bsdf(&mut self, index: GraphObjectIndex, context: BsdfContext) -> Option<MaterialBuilder> {
         let object = self.object_by_index(index);
         if context.depth > MAX_DEPTH {
             self.report_error(object.span.clone(), "BSDFs are nested too deeply", None);
@@ -223,7 +219,7 @@ impl<'a> SceneReader<'a> {
                 let color = self.reflectance(object, "reflectance", 0.5, context);
                 object.property("use_fast_approx");
                 object.property("alpha");
-                self.notes.substitute_changing_lighting(
+                self.notes.note_lighting_substitution(
                     "`roughdiffuse`",
                     "replaced by `diffuse`",
                     object.span.clone(),
@@ -243,7 +239,7 @@ impl<'a> SceneReader<'a> {
             "normalmap" => self.normal_map(object, context),
             "principled" => Some(self.principled(object, context)),
             "principledthin" => {
-                self.notes.substitute_changing_lighting(
+                self.notes.note_lighting_substitution(
                     "`principledthin`",
                     "rendered as `principled`",
                     object.span.clone(),
@@ -330,7 +326,7 @@ impl<'a> SceneReader<'a> {
         &mut self,
         number: NumberSource,
         context: BsdfContext,
-        convert_texture: impl FnOnce(&mut Self, NodeIndex, UvFlips) -> Option<SceneDocumentValue>,
+        convert_texture: impl FnOnce(&mut Self, GraphObjectIndex, UvFlips) -> Option<SceneDocumentValue>,
     ) -> SceneDocumentValue {
         match number {
             NumberSource::Constant(number) => shorten_number(number.clamp(0.0, 1.0)).into(),

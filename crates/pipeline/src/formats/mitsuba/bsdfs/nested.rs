@@ -2,7 +2,7 @@
 
 use super::{BsdfContext, MaterialBuilder};
 use crate::formats::foreign::import::TableEntries;
-use crate::formats::mitsuba::graph::{Child, NodeIndex, ObjectKind, PluginInstance};
+use crate::formats::mitsuba::graph::{Child, GraphObjectIndex, ObjectKind, PluginInstance};
 use crate::formats::mitsuba::material_key::BlendPartKey;
 use crate::formats::mitsuba::property::PropertyValue;
 use crate::formats::mitsuba::reader::{ColorRole, ColorSource, NumberSource, SceneReader};
@@ -33,14 +33,14 @@ impl<'a> SceneReader<'a> {
             && second.target != nested.target
         {
             let text = "the first BSDF is used on both sides";
-            self.notes.substitute_changing_lighting("`twosided` with two BSDFs", text, object.span.clone());
+            self.notes.note_lighting_substitution("`twosided` with two BSDFs", text, object.span.clone());
         }
         let context = BsdfContext { is_two_sided: true, ..context };
         let built = self.bsdf(nested.target, context)?;
         Some(MaterialBuilder { is_one_sided: false, ..built })
     }
 
-    pub(super) fn mask(&mut self, index: NodeIndex, context: BsdfContext) -> Option<MaterialBuilder> {
+    pub(super) fn mask(&mut self, index: GraphObjectIndex, context: BsdfContext) -> Option<MaterialBuilder> {
         let object = self.object_by_index(index);
         let nested = self.nested_bsdf(object)?;
         let opacity = self.fraction(object, "opacity", 0.5);
@@ -49,7 +49,7 @@ impl<'a> SceneReader<'a> {
         }
         if context.mask.is_some() {
             let text = "the inner mask is ignored";
-            self.notes.substitute_changing_lighting("`mask` around another mask", text, object.span.clone());
+            self.notes.note_lighting_substitution("`mask` around another mask", text, object.span.clone());
             return self.bsdf(nested.target, context);
         }
         let context = BsdfContext { mask: Some(index), ..context };
@@ -66,7 +66,7 @@ impl<'a> SceneReader<'a> {
         let Some(object) = context.mask.map(|index| self.object_by_index(index)) else { return };
         if built.is_glass && !built.has_key("thin") || built.has_key("opacity") {
             let text = "the mask is ignored";
-            self.notes.substitute_changing_lighting("`mask` around solid glass", text, object.span.clone());
+            self.notes.note_lighting_substitution("`mask` around solid glass", text, object.span.clone());
             return;
         }
         let text = "light from point, spot and directional lights passes through them; Mitsuba blocks it";
@@ -148,12 +148,16 @@ impl<'a> SceneReader<'a> {
         Some(self.add_material(built, wanted, inner.span.clone()))
     }
 
-    pub(super) fn coating(&mut self, index: NodeIndex, context: BsdfContext) -> Option<MaterialBuilder> {
+    pub(super) fn coating(
+        &mut self,
+        index: GraphObjectIndex,
+        context: BsdfContext,
+    ) -> Option<MaterialBuilder> {
         let object = self.object_by_index(index);
         let nested = self.nested_bsdf(object)?;
         if context.coat.is_some() {
             let text = "the inner coat is ignored";
-            self.notes.substitute_changing_lighting("a coat on another coat", text, object.span.clone());
+            self.notes.note_lighting_substitution("a coat on another coat", text, object.span.clone());
             return self.bsdf(nested.target, context);
         }
         let context = BsdfContext { coat: Some(index), ..context };
@@ -183,7 +187,7 @@ impl<'a> SceneReader<'a> {
         let Some(object) = context.coat.map(|index| self.object_by_index(index)) else { return };
         if built.is_glass {
             let text = "the coat is ignored";
-            self.notes.substitute_changing_lighting("a coat on glass", text, object.span.clone());
+            self.notes.note_lighting_substitution("a coat on glass", text, object.span.clone());
             return;
         }
         let text = "interreflections between coat and base differ";
@@ -210,7 +214,7 @@ impl<'a> SceneReader<'a> {
             }
             ColorSource::Constant(_) => {}
             ColorSource::Texture(_) => {
-                self.notes.substitute_changing_lighting(
+                self.notes.note_lighting_substitution(
                     "a textured `sigma_a`",
                     "replaced by 0",
                     object.span.clone(),
@@ -220,7 +224,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Returns the nested texture of a bump or normal map.
-    pub(super) fn nested_texture(&mut self, object: &'a PluginInstance) -> Option<NodeIndex> {
+    pub(super) fn nested_texture(&mut self, object: &'a PluginInstance) -> Option<GraphObjectIndex> {
         let texture = self.children_of_kind(object, ObjectKind::Texture).next();
         if texture.is_none() {
             let message = format!("`{}` needs a nested texture", truncate_for_message(&object.plugin));
@@ -248,7 +252,7 @@ impl<'a> SceneReader<'a> {
         let mut built = self.bsdf(nested.target, context)?;
         if built.is_blend || built.is_invisible || built.has_key("bump") {
             let text = "the bump map is ignored";
-            self.notes.substitute_changing_lighting(
+            self.notes.note_lighting_substitution(
                 "`bumpmap` around a blend or another bump map",
                 text,
                 object.span.clone(),
@@ -284,7 +288,7 @@ impl<'a> SceneReader<'a> {
         let mut built = self.bsdf(nested.target, context)?;
         if built.is_blend || built.is_invisible || built.has_key("normal_map") {
             let text = "the normal map is ignored";
-            self.notes.substitute_changing_lighting(
+            self.notes.note_lighting_substitution(
                 "`normalmap` around a blend or another normal map",
                 text,
                 object.span.clone(),
@@ -303,11 +307,7 @@ impl<'a> SceneReader<'a> {
     pub(super) fn note_constant_normal_map(&mut self, constant: &'a PluginInstance) {
         let value = constant.property("value").map(|property| &property.value);
         if value != Some(&PropertyValue::Vector(DVec3::new(0.5, 0.5, 1.0))) {
-            self.notes.substitute_changing_lighting(
-                "a constant normal map",
-                "ignored",
-                constant.span.clone(),
-            );
+            self.notes.note_lighting_substitution("a constant normal map", "ignored", constant.span.clone());
         }
     }
 }

@@ -23,7 +23,7 @@ impl<'a> SceneReader<'a> {
         let scale = self.color_or_texture(object, name, ColorRole::Reflectance, 1.0);
         if scale != ColorSource::Constant(DVec3::ONE) {
             let subject = format!("`{name}` of `{}`", truncate_for_message(&object.plugin));
-            self.notes.substitute_changing_lighting(&subject, "replaced by 1", span_of(object, name));
+            self.notes.note_lighting_substitution(&subject, "replaced by 1", span_of(object, name));
         }
     }
 
@@ -97,7 +97,7 @@ impl<'a> SceneReader<'a> {
             (NumberSource::Texture(_) | NumberSource::Constant(_), _) => {
                 let one = if matches!(across, NumberSource::Texture(_)) { across } else { along };
                 let text = "one of them is used as isotropic roughness";
-                self.notes.substitute_changing_lighting(
+                self.notes.note_lighting_substitution(
                     "textured `alpha_u` and `alpha_v`",
                     text,
                     object.span.clone(),
@@ -207,7 +207,7 @@ impl<'a> SceneReader<'a> {
         if let Some(outside) = object.property("ext_eta").map(|_| self.ior(object, "ext_eta", AIR))
             && (outside - AIR).abs() > 1e-3
         {
-            self.notes.substitute_changing_lighting(
+            self.notes.note_lighting_substitution(
                 "`ext_eta` of a conductor",
                 "replaced by air",
                 span_of(object, "ext_eta"),
@@ -245,7 +245,7 @@ impl<'a> SceneReader<'a> {
                 }
                 if color.max_element() - color.min_element() > 2e-3 {
                     let text = "replaced by its luminance";
-                    self.notes.substitute_changing_lighting(
+                    self.notes.note_lighting_substitution(
                         "a colored `specular_reflectance`",
                         text,
                         span_of(object, "specular_reflectance"),
@@ -256,7 +256,7 @@ impl<'a> SceneReader<'a> {
             ColorSource::Texture(texture) => match self.number_texture(texture, context.uv) {
                 Some(value) => {
                     let text = "replaced by its luminance";
-                    self.notes.substitute_changing_lighting(
+                    self.notes.note_lighting_substitution(
                         "a textured `specular_reflectance`",
                         text,
                         span_of(object, "specular_reflectance"),
@@ -373,7 +373,7 @@ impl<'a> SceneReader<'a> {
         let exponent = match self.number_or_texture(object, "exponent", 30.0) {
             NumberSource::Constant(exponent) => exponent.clamp(0.0, 1e6),
             NumberSource::Texture(_) => {
-                self.notes.substitute_changing_lighting(
+                self.notes.note_lighting_substitution(
                     "a textured `exponent`",
                     "replaced by 30",
                     object.span.clone(),
@@ -390,7 +390,7 @@ impl<'a> SceneReader<'a> {
     }
 
     pub(super) fn ward(&mut self, object: &'a PluginInstance, context: BsdfContext) -> MaterialBuilder {
-        self.notes.substitute_changing_lighting(
+        self.notes.note_lighting_substitution(
             "`ward`",
             "replaced by Phong with a highlight of the same width",
             object.span.clone(),
@@ -445,7 +445,7 @@ impl<'a> SceneReader<'a> {
             // The tint of a sheen that is 0 has no effect.
             if !is_zero && (name != "sheen_tint" || has_sheen) {
                 let subject = format!("`{name}` of `{}`", object.plugin);
-                self.notes.substitute_changing_lighting(&subject, "ignored", span_of(object, name));
+                self.notes.note_lighting_substitution(&subject, "ignored", span_of(object, name));
             }
         }
         for name in [
@@ -459,7 +459,7 @@ impl<'a> SceneReader<'a> {
         let has_coat = self.number_or_texture(object, "clearcoat", 0.0) != NumberSource::Constant(0.0);
         if has_coat {
             let text = "rendered with glimt's coat, which is up to 14 % darker";
-            self.notes.substitute_changing_lighting("`clearcoat` of `principled`", text, object.span.clone());
+            self.notes.note_lighting_substitution("`clearcoat` of `principled`", text, object.span.clone());
         }
         // Pure metals match Mitsuba's.
         if self.number_or_texture(object, "metallic", 0.0) != NumberSource::Constant(1.0) {

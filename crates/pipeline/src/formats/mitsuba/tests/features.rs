@@ -11,7 +11,7 @@ use crate::math::DVec3;
 /// The generated meshes of a scene.
 fn generated_meshes(bench: &Bench) -> Vec<LoadedMesh> {
     let scene = bench.read().expect("a valid scene");
-    let files = scene.document.in_memory_files().iter().filter(|(name, _)| name.ends_with(".ply"));
+    let files = scene.document.added_in_memory_files().iter().filter(|(name, _)| name.ends_with(".ply"));
     let load = |(name, file): (&String, &crate::scene::InMemoryFile)| {
         load_from_bytes(Path::new(name), &file.bytes, &ignore_progress, &CancelToken::new()).expect("a mesh")
     };
@@ -51,7 +51,7 @@ fn attributes_of_faces_are_images() {
     has_line(&text, "filter = \"nearest\"");
     let mesh = generated_meshes(&bench).remove(0).mesh;
     let scene = bench.read().expect("a valid scene");
-    let files = scene.document.in_memory_files();
+    let files = scene.document.added_in_memory_files();
     let image = &files.iter().find(|(name, _)| name.ends_with(".pfm")).expect("an image").1.bytes;
     let header = b"PF\n2 1\n-1.0\n";
     assert!(image.starts_with(header));

@@ -182,7 +182,7 @@ impl Parser<'_> {
                 }
             }
         }
-        Ok(lexer.end_span())
+        Ok(lexer.end_of_text_span())
     }
 
     /// Checks for unclosed blocks and a missing `WorldBegin`.
@@ -260,7 +260,7 @@ impl Parser<'_> {
                 self.transform_statement(directive, lexer)
             }
             "Camera" | "Film" | "Integrator" | "PixelFilter" | "Sampler" | "Accelerator" => {
-                self.entity_before_world(directive, lexer)
+                self.add_statement_before_world(directive, lexer)
             }
             "Option" => {
                 quoted(directive, lexer)?;
@@ -326,7 +326,7 @@ impl Parser<'_> {
         PlacedEntity { entity, transform: self.state.transform }
     }
 
-    fn entity_before_world(&mut self, directive: &Token<'_>, lexer: &mut Lexer<'_>) -> PbrtResult<()> {
+    fn add_statement_before_world(&mut self, directive: &Token<'_>, lexer: &mut Lexer<'_>) -> PbrtResult<()> {
         let name = &*directive.text;
         if self.is_world {
             let error = PbrtError::new(directive.span.clone(), format!("`{name}` must precede `WorldBegin`"));

@@ -216,7 +216,7 @@ fn number_textures_decode_from_srgb() {
     let world = format!("{texture}Material \"conductor\" \"texture roughness\" \"t\"\nShape \"sphere\"");
     let folder = folder_with_image(&world);
     let scene = folder.read().expect("a scene");
-    let file = scene.document.in_memory_files().values().next().expect("an image");
+    let file = scene.document.added_in_memory_files().values().next().expect("an image");
     let texel = &file.bytes[file.bytes.len() - 8..];
     let values = [0, 4].map(|at| f32::from_le_bytes(texel[at..at + 4].try_into().expect("4 bytes")));
     for (value, byte) in values.iter().zip([64.0_f64, 128.0]) {
@@ -242,7 +242,7 @@ fn inverted_images_are_baked() {
         "Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"a.pgm\" \"bool invert\" true\n";
     let world = format!("{texture}Material \"diffuse\" \"texture reflectance\" \"t\"\nShape \"sphere\"");
     let scene = folder_with_image(&world).read().expect("a scene");
-    let file = scene.document.in_memory_files().values().next().expect("an image");
+    let file = scene.document.added_in_memory_files().values().next().expect("an image");
     let first = f32::from_le_bytes(file.bytes[file.bytes.len() - 24..][..4].try_into().expect("4 bytes"));
     let linear = ((64.0 / 255.0 + 0.055) / 1.055_f64).powf(2.4);
     assert!((f64::from(first) - (1.0 - linear)).abs() < 1e-6, "{first}");

@@ -7,7 +7,7 @@ mod fuzz;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use super::read_glimt_scene;
+use super::read;
 use crate::assets::mesh::load_from_bytes;
 use crate::control::{CancelToken, ignore_progress};
 use crate::formats::foreign::{ForeignError, ForeignOptions};
@@ -54,7 +54,7 @@ pub(super) fn read_path(path: &Path, options: &ForeignOptions) -> Result<Foreign
     let (containers, token) = (OpenAssetFiles::default(), CancelToken::new());
     let view = ModelViewOptions::default();
     let context = ForeignReadContext { view, options, containers: &containers, token: &token };
-    read_glimt_scene(path, &context).map_err(|error| match error {
+    read(path, &context).map_err(|error| match error {
         ForeignError::Asset(error) => panic!("{error}"),
         ForeignError::Scene { diagnostics, .. } => diagnostics,
     })
@@ -77,7 +77,7 @@ pub(super) const CAMERA: &str = "LookAt 0 0 -5  0 0 0  0 1 0\nCamera \"perspecti
 
 /// The generated meshes of a scene.
 pub(super) fn generated_meshes(scene: &ForeignScene) -> Vec<crate::assets::LoadedMesh> {
-    let files = scene.document.in_memory_files().iter();
+    let files = scene.document.added_in_memory_files().iter();
     let load = |(name, file): (&String, &crate::scene::InMemoryFile)| {
         load_from_bytes(Path::new(name), &file.bytes, &ignore_progress, &CancelToken::new()).expect("a mesh")
     };

@@ -156,8 +156,8 @@ impl PhotonWavefront<'_> {
         }
     }
 
-    /// Stores a photon at a vertex. Its flux is scaled up to account for photons that passed through the surface
-    /// as a null interaction, or that chose a part of a blend on which no photons are stored.
+    /// Stores a photon at a vertex. Its flux is scaled up to account for photons that passed through the
+    /// surface as a null interaction, or that chose a part of a blend on which no photons are stored.
     fn store_rescaled_photon(&mut self, path: &PathRay, vertex: &SurfaceVertex<'_>) {
         let chance = storage_probability(path, vertex, &mut self.counters.texture_lookups);
         let all = PathRay { throughput: path.throughput / chance, ..*path };
