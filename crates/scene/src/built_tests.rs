@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::description::Scene;
 use super::diagnostic::Diagnostic;
-use super::{LoadedScene, SceneDocumentBuilder, SceneDocumentValue, load_built, parse};
+use super::{LoadedScene, SceneDocumentBuilder, SceneDocumentValue, load_from_built_document, parse};
 use crate::math::DVec3;
 
 /// Text of a foreign file. The last number is the radius of the second sphere.
@@ -41,7 +41,7 @@ fn built(radius: f64, source: &str) -> SceneDocumentBuilder {
 
 fn load(built: SceneDocumentBuilder, sets: &[&str]) -> Result<LoadedScene, Vec<Diagnostic>> {
     let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
-    load_built(built, Path::new("a.pbrt"), &sets)
+    load_from_built_document(built, Path::new("a.pbrt"), &sets)
 }
 
 fn first_error(built: SceneDocumentBuilder, sets: &[&str]) -> Diagnostic {

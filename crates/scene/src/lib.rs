@@ -3,7 +3,7 @@
 //! [`load`] checks a file's size and type and reads it. [`parse`] converts its text to a
 //! [`description::Scene`] and a list of [`diagnostic::Diagnostic`]s. [`report`] formats diagnostics for the
 //! terminal. Importers of foreign formats build a [`SceneDocumentBuilder`] instead of a text, and
-//! [`load_built`] validates it in the same way.
+//! [`load_from_built_document`] validates it in the same way.
 
 mod changes;
 pub mod description;
@@ -212,7 +212,7 @@ pub fn load(path: &Path, sets: &[String]) -> Result<LoadedScene, Vec<Diagnostic>
 ///
 /// # Errors
 /// Returns all errors and warnings.
-pub fn load_built(
+pub fn load_from_built_document(
     built: SceneDocumentBuilder,
     path: &Path,
     sets: &[String],

@@ -99,7 +99,7 @@ impl SceneText {
     }
 
     /// Whether a span is in a foreign file, where the text need not match the value.
-    pub(super) fn is_foreign_span(&self, span: &Range<usize>) -> bool {
+    pub(super) fn is_span_in_foreign_format(&self, span: &Range<usize>) -> bool {
         self.is_foreign && !self.is_span_in_set_arg(span)
     }
 

@@ -59,7 +59,7 @@ impl MergeCommand<'_> {
         let format = self.check_output()?;
         let parts = if self.args.watch { self.wait_for_parts()? } else { self.open_parts()? };
         let inputs = RenderInputFiles::new(&parts, &self.args.out, self.token);
-        self.check_output_is_not_render_input(&inputs)?;
+        self.check_output_is_not_scene_input(&inputs)?;
         let merged = self.merge_parts(&parts, self.args.partial, "merge")?;
         let Some(finish) = parts.first().and_then(|part| part.head.picture.film_encoding_settings()) else {
             return Err(self.console.print_error(Exit::WRONG, "the parts contain no output settings"));
@@ -89,7 +89,7 @@ impl MergeCommand<'_> {
     }
 
     /// Checks that the output does not replace an input file of the render.
-    fn check_output_is_not_render_input(&self, inputs: &RenderInputFiles<'_>) -> Result<(), Exit> {
+    fn check_output_is_not_scene_input(&self, inputs: &RenderInputFiles<'_>) -> Result<(), Exit> {
         match self.message_if_render_input(inputs, &self.args.out) {
             Ok(None) => Ok(()),
             Ok(Some(message)) => Err(self.console.print_error(Exit::WRONG, &message)),

@@ -107,7 +107,7 @@ impl Drop for StagingFolder {
 
 #[cfg(test)]
 mod tests {
-    use super::super::temporary::tests::{foreign_temporary_name, stale_temporary_name};
+    use super::super::temporary::tests::{stale_temporary_name, temporary_name_of_other_machine};
     use super::*;
 
     fn names(folder: &Path) -> Vec<String> {
@@ -156,8 +156,8 @@ mod tests {
         let directory = tempfile::tempdir().expect("a folder");
         let at = directory.path();
         let living = StagingFolder::create(at, OsStr::new("a.toml")).expect("a folder");
-        let [stale, foreign] =
-            [stale_temporary_name("a.toml"), foreign_temporary_name("a.toml")].map(|name| at.join(name));
+        let [stale, foreign] = [stale_temporary_name("a.toml"), temporary_name_of_other_machine("a.toml")]
+            .map(|name| at.join(name));
         let other = at.join(".a.toml.tmp");
         for folder in [&stale, &foreign, &other] {
             fs::create_dir_all(folder.join("a_files")).expect("a folder");

@@ -205,7 +205,7 @@ pub(super) mod tests {
     }
 
     /// A temporary name from a process on another machine.
-    pub(in crate::output) fn foreign_temporary_name(name: &str) -> OsString {
+    pub(in crate::output) fn temporary_name_of_other_machine(name: &str) -> OsString {
         let dead = dead_process();
         temporary_name(OsStr::new(name), &ProcessIdentity { machine: dead.machine ^ 1, ..dead })
     }
@@ -255,7 +255,7 @@ pub(super) mod tests {
         let stale = write(stale_temporary_name("b.png"));
         // The writers of these files may be alive.
         let kept = [
-            write(foreign_temporary_name("b.png")),
+            write(temporary_name_of_other_machine("b.png")),
             write(next_temporary_name(OsStr::new("b.png"))),
             write(".b.png.glimt-123-4.tmp".into()),
             write(".b.png.tmp".into()),

@@ -93,7 +93,7 @@ impl OrientedBox {
     pub fn surface_point_at_hit(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
         let SurfacePointF64 { point, normal: outwards, reach } = self.surface_point_f64(ray, hit);
         let chart = self.face_mapping(hit.primitive);
-        let uv = chart.uv(self.local_hit_point(ray, hit));
+        let uv = chart.uv(self.hit_to_local_point(ray, hit));
         let FaceMapping { u, v, width, height } = chart;
         let uv = uv.as_vec2();
         SurfacePoint::from_f64(point, outwards, uv, self.axes * (u * width), self.axes * (v * height), reach)
@@ -128,7 +128,7 @@ impl OrientedBox {
 
     /// Local coordinates of a hit, projected onto the face.
     #[inline(always)]
-    fn local_hit_point(&self, ray: &RayF64, hit: &ShapeHit) -> DVec3 {
+    fn hit_to_local_point(&self, ray: &RayF64, hit: &ShapeHit) -> DVec3 {
         let from_center = ray.at(f64::from(hit.t)) - self.center;
         let along = |axis: DVec3, half: f64| axis.dot(from_center).max(-half).min(half);
         let DVec3 { x, y, z } = self.half;
@@ -230,7 +230,7 @@ fn face_axis_and_normal(face: u32) -> (usize, DVec3) {
 impl SurfacePointsInF64 for OrientedBox {
     #[inline(always)]
     fn surface_point_f64(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePointF64 {
-        let (local, n) = (self.local_hit_point(ray, hit), branchless_face_normal(hit.primitive));
+        let (local, n) = (self.hit_to_local_point(ray, hit), branchless_face_normal(hit.primitive));
         let out_of = |v: DVec3| self.axes.x_axis * v.x + self.axes.y_axis * v.y + self.axes.z_axis * v.z;
         let reach = self.center.abs().max_element() + self.half.length();
         SurfacePointF64 { point: self.center + out_of(local), normal: out_of(n), reach }

@@ -28,8 +28,8 @@ use crate::control::CancelToken;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::sanitize::escape_invisible_chars;
 use crate::scene::{
-    LoadedScene, MODEL_NOT_FOUND, NEW_SCENE_HELP, SceneDocumentBuilder, lacks_camera_header, load_built,
-    missing_file_help,
+    LoadedScene, MODEL_NOT_FOUND, NEW_SCENE_HELP, SceneDocumentBuilder, lacks_camera_header,
+    load_from_built_document, missing_file_help,
 };
 use crate::system::file::{FileKind, file_kind_and_metadata};
 
@@ -138,7 +138,7 @@ pub(crate) fn scene_from_document(
     path: &Path,
     sets: &[String],
 ) -> Result<LoadedScene, Vec<Diagnostic>> {
-    load_built(document, path, sets).map_err(|mut errors| {
+    load_from_built_document(document, path, sets).map_err(|mut errors| {
         // The user cannot see generated values, so explain their origin. Errors in overrides need no prefix.
         for error in errors.iter_mut().filter(|error| error.path == path && error.place.is_none()) {
             let what = if has_model_extension(path) {

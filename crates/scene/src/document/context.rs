@@ -153,7 +153,8 @@ impl<'a> FileContext<'a> {
     /// Source text of a value. `None` if the value has no source text, or is from a foreign file, where the
     /// text need not match the value.
     pub(super) fn value_text(&self, span: &Range<usize>) -> Option<&str> {
-        Some(self.span_text(span)).filter(|text| !text.is_empty() && !self.source.is_foreign_span(span))
+        Some(self.span_text(span))
+            .filter(|text| !text.is_empty() && !self.source.is_span_in_foreign_format(span))
     }
 
     /// Calls `look` to search a list for a similar name, unless the file's search limit has been reached. The

@@ -29,7 +29,7 @@ const COLORS: [Vec3; 6] = [
 
 /// A box edge close to a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct NearbyBoxEdge {
+struct BoxEdgeToDraw {
     is_behind: bool,
     depth: u32,
 }
@@ -46,7 +46,7 @@ pub fn draw_box_edges(
     tile.closest_hits_of_queue(&scratch.rays, &mut scratch.hits)?;
     for (path, hit) in scratch.rays.iter().zip(&scratch.hits) {
         let end = hit.map_or(f32::INFINITY, |hit| hit.shape.t);
-        if let Some(NearbyBoxEdge { is_behind, depth }) = find_edge_to_draw(tile, &path.ray, end, footprint) {
+        if let Some(BoxEdgeToDraw { is_behind, depth }) = find_edge_to_draw(tile, &path.ray, end, footprint) {
             let color = COLORS[depth as usize % COLORS.len()] * brightness;
             let own = &mut radiance[path.slot as usize];
             *own = own.lerp(color, if is_behind { HIDDEN_OPACITY } else { 1.0 });
@@ -62,8 +62,8 @@ fn find_edge_to_draw(
     ray: &Ray,
     end: f32,
     footprint: PixelFootprint,
-) -> Option<NearbyBoxEdge> {
-    let mut best: Option<NearbyBoxEdge> = None;
+) -> Option<BoxEdgeToDraw> {
+    let mut best: Option<BoxEdgeToDraw> = None;
     tile.world.geometry.visit_nodes_hit_by_ray(ray, |local, VisitedNode { bounds, depth, .. }, stretch| {
         let unit = local.direction.length();
         let pixel = |t: f32| (footprint.width + t * footprint.spread) * unit;
@@ -73,7 +73,7 @@ fn find_edge_to_draw(
             return false;
         }
         for (t, side) in [enter, leave].into_iter().filter(|(t, _)| *t > 0.0) {
-            let line = NearbyBoxEdge { is_behind: t > end, depth: *depth };
+            let line = BoxEdgeToDraw { is_behind: t > end, depth: *depth };
             let is_first =
                 best.is_none_or(|best| (line.is_behind, line.depth) < (best.is_behind, best.depth));
             if is_first

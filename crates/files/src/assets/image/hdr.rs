@@ -150,7 +150,7 @@ impl HeaderVariables {
                     true
                 }
                 other => {
-                    return Err(unsupported_format_message(other));
+                    return Err(unsupported_pixel_format_message(other));
                 }
             },
             "EXPOSURE" => {
@@ -200,7 +200,7 @@ pub(super) fn header_too_long_message() -> String {
     format!("the header is longer than {} MiB", HEADER_BYTES >> 20)
 }
 
-pub(super) fn unsupported_format_message(found: &str) -> String {
+pub(super) fn unsupported_pixel_format_message(found: &str) -> String {
     format!("format {found:?} is neither 32-bit_rle_rgbe nor 32-bit_rle_xyze")
 }
 

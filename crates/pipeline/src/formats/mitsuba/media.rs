@@ -13,7 +13,7 @@ impl<'a> SceneReader<'a> {
         for child in self.children_of_kind(object, ObjectKind::Medium) {
             let medium = self.object_by_index(child.target);
             let is_inside = matches!(child.name.as_deref(), None | Some("interior"));
-            let absorption = if is_inside && self.has_solid_glass(object) {
+            let absorption = if is_inside && self.is_solid_glass_shape(object) {
                 self.pure_absorption_coefficient(medium)
             } else {
                 None
@@ -37,7 +37,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Whether the BSDF of a shape is glass with an inside.
-    fn has_solid_glass(&self, object: &'a PluginInstance) -> bool {
+    fn is_solid_glass_shape(&self, object: &'a PluginInstance) -> bool {
         let bsdf = self.children_of_kind(object, ObjectKind::Bsdf).next();
         bsdf.is_some_and(|child| {
             matches!(&*self.object_by_index(child.target).plugin, "dielectric" | "roughdielectric")

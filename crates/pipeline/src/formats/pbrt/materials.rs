@@ -148,7 +148,7 @@ impl MaterialReader<'_, '_> {
     }
 
     /// Reads a parameter that may be a texture or a constant.
-    fn read_texture_node(
+    fn read_texture_or_constant(
         &mut self,
         name: &'static str,
         value: TextureValueKind,
@@ -161,7 +161,7 @@ impl MaterialReader<'_, '_> {
 
     /// Reads the color parameter `name` into `key`.
     fn color(&mut self, key: &'static str, name: &'static str, default: f64) -> PbrtResult<()> {
-        let node = self.read_texture_node(name, TextureValueKind::REFLECTANCE)?;
+        let node = self.read_texture_or_constant(name, TextureValueKind::REFLECTANCE)?;
         let node = node.unwrap_or(TextureNode::Constant(DVec3::splat(default)));
         let value = self.writer.color_value(&node);
         self.keys.push((key, value));
@@ -191,10 +191,11 @@ impl MaterialReader<'_, '_> {
     fn roughness(&mut self, names: [&'static str; 3]) -> PbrtResult<Roughness> {
         let [both, u, v] = names;
         let is_remapped = self.parameters.bool("remaproughness", true)?;
-        let usual = self.read_texture_node(both, TextureValueKind::Number)?;
+        let usual = self.read_texture_or_constant(both, TextureValueKind::Number)?;
         let usual = usual.unwrap_or(TextureNode::Constant(DVec3::ZERO));
-        let along_u = self.read_texture_node(u, TextureValueKind::Number)?.unwrap_or_else(|| usual.clone());
-        let along_v = self.read_texture_node(v, TextureValueKind::Number)?.unwrap_or(usual);
+        let along_u =
+            self.read_texture_or_constant(u, TextureValueKind::Number)?.unwrap_or_else(|| usual.clone());
+        let along_v = self.read_texture_or_constant(v, TextureValueKind::Number)?.unwrap_or(usual);
         let alpha = |node: &TextureNode| {
             let value = node.as_constant()?.x.max(0.0);
             Some(if is_remapped { value.sqrt() } else { value })
@@ -260,7 +261,7 @@ impl MaterialReader<'_, '_> {
 
     /// Ignores the medium between the layers of a coated material, and notes if it is not clear.
     fn ignore_layer_medium(&mut self) -> PbrtResult<()> {
-        let albedo = self.read_texture_node("albedo", TextureValueKind::REFLECTANCE)?;
+        let albedo = self.read_texture_or_constant("albedo", TextureValueKind::REFLECTANCE)?;
         if albedo.is_some_and(|albedo| albedo.as_constant() != Some(DVec3::ZERO)) {
             let text = "the layer is clear";
             let span = self.parameters.span_of("albedo");
@@ -286,9 +287,11 @@ impl MaterialReader<'_, '_> {
         };
         self.keys.push(("type", "metal".into()));
         let unbounded = TextureValueKind::Color(SpectrumUse::Unbounded);
-        let [eta, k] =
-            [self.read_texture_node(eta_name, unbounded)?, self.read_texture_node(k_name, unbounded)?];
-        match self.read_texture_node("reflectance", TextureValueKind::REFLECTANCE)? {
+        let [eta, k] = [
+            self.read_texture_or_constant(eta_name, unbounded)?,
+            self.read_texture_or_constant(k_name, unbounded)?,
+        ];
+        match self.read_texture_or_constant("reflectance", TextureValueKind::REFLECTANCE)? {
             Some(_) if eta.is_some() || k.is_some() => {
                 let span = self.parameters.span_of("reflectance");
                 let message = format!("`reflectance` cannot be combined with `{eta_name}` and `{k_name}`");
@@ -361,7 +364,7 @@ impl MaterialReader<'_, '_> {
         let scale = TextureNode::Constant(DVec3::splat(self.parameters.float("scale", 1.0)?));
         let parts = [("diffuse", "reflectance"), ("diffuse_transmission", "transmittance")];
         for (key, name) in parts {
-            let node = self.read_texture_node(name, TextureValueKind::REFLECTANCE)?;
+            let node = self.read_texture_or_constant(name, TextureValueKind::REFLECTANCE)?;
             let node = node.unwrap_or(TextureNode::Constant(DVec3::splat(0.25)));
             let value = self.writer.color_value(&TextureNode::product(scale.clone(), node));
             self.keys.push((key, value));
@@ -376,10 +379,11 @@ impl MaterialReader<'_, '_> {
         let constant = |node: Option<TextureNode>, default: [f64; 3]| {
             node.and_then(|node| node.as_constant()).unwrap_or(DVec3::from(default))
         };
-        let absorption = constant(self.read_texture_node("sigma_a", unbounded)?, [0.0011, 0.0024, 0.014]);
-        let scattering = constant(self.read_texture_node("sigma_s", unbounded)?, [2.55, 3.21, 3.77]);
+        let absorption =
+            constant(self.read_texture_or_constant("sigma_a", unbounded)?, [0.0011, 0.0024, 0.014]);
+        let scattering = constant(self.read_texture_or_constant("sigma_s", unbounded)?, [2.55, 3.21, 3.77]);
         let asymmetry = self.parameters.float("g", 0.0)?;
-        let reflectance = match self.read_texture_node("reflectance", TextureValueKind::REFLECTANCE)? {
+        let reflectance = match self.read_texture_or_constant("reflectance", TextureValueKind::REFLECTANCE)? {
             Some(reflectance) => reflectance,
             None => TextureNode::Constant(diffusion_albedo(absorption, scattering, asymmetry)),
         };
@@ -394,9 +398,9 @@ impl MaterialReader<'_, '_> {
     }
 
     fn read_hair(&mut self, entity: &TypedStatement) -> PbrtResult<()> {
-        let color = match self.read_texture_node("reflectance", TextureValueKind::REFLECTANCE)? {
+        let color = match self.read_texture_or_constant("reflectance", TextureValueKind::REFLECTANCE)? {
             Some(color) => Some(color),
-            None => self.read_texture_node("color", TextureValueKind::REFLECTANCE)?,
+            None => self.read_texture_or_constant("color", TextureValueKind::REFLECTANCE)?,
         };
         let brown = TextureNode::Constant(DVec3::new(0.22, 0.12, 0.05));
         let value = self.writer.color_value(&color.unwrap_or(brown));
@@ -416,14 +420,14 @@ impl MaterialReader<'_, '_> {
         };
         let part = |text: &Text| BlendPartReference { name: text.text.clone(), span: text.span.clone() };
         let parts = [part(first), part(second)];
-        let amount = self.read_texture_node("amount", TextureValueKind::Number)?;
+        let amount = self.read_texture_or_constant("amount", TextureValueKind::Number)?;
         let amount = amount.unwrap_or(TextureNode::Constant(DVec3::splat(0.5)));
         Ok(ConvertedMaterial::Blend { parts, amount })
     }
 
     /// Reads `displacement`, which becomes a bump map.
     fn read_bump(&mut self) -> PbrtResult<()> {
-        let Some(node) = self.read_texture_node("displacement", TextureValueKind::Number)? else {
+        let Some(node) = self.read_texture_or_constant("displacement", TextureValueKind::Number)? else {
             return Ok(());
         };
         let node = self.writer.with_missing_images_gray(&node);

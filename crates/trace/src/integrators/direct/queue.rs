@@ -87,8 +87,8 @@ impl DirectLightVertexQueue {
         self.clear();
         self.cones.clear();
         self.cones.resize(if has_cones { paths } else { 0 }, RayCone::default());
-        resize_with_zeros(&mut self.arrived, paths);
-        resize_with_zeros(&mut self.arrived_diffuse, if splits_lobes { paths } else { 0 });
+        zero_and_resize(&mut self.arrived, paths);
+        zero_and_resize(&mut self.arrived_diffuse, if splits_lobes { paths } else { 0 });
         self.interior_lists.clear();
     }
 
@@ -427,7 +427,7 @@ fn interiors_of_batch<'a>(pool: &'a InteriorListPool, row: &VertexBatch) -> Opti
 }
 
 /// Resizes a vector and sets all its elements to zero.
-fn resize_with_zeros(sums: &mut Vec<Vec3>, count: usize) {
+fn zero_and_resize(sums: &mut Vec<Vec3>, count: usize) {
     // `Vec::resize` writes one component at a time, so it is used only for new elements.
     sums.truncate(count);
     bytemuck::fill_zeroes(sums);

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::assets::image::hdr::{
-    RUN_TOO_LONG, WRONG_LENGTH, line_ignored_warning, unsupported_format_message,
+    RUN_TOO_LONG, WRONG_LENGTH, line_ignored_warning, unsupported_pixel_format_message,
 };
 
 /// A pixel with exponent 129, so one mantissa step is 1/128.
@@ -40,7 +40,7 @@ fn header_variants_are_read() {
     }
     assert_eq!(error("a.hdr", b"#RADIANCE\n\n-Y 1 +X 1\nabcd"), unknown_format_message());
     let unknown = error("a.hdr", &file("FORMAT=32-bit_rle_xyzw\n", "-Y 1 +X 1", &PIXEL));
-    assert!(unknown.ends_with(&unsupported_format_message("32-bit_rle_xyzw")), "{unknown}");
+    assert!(unknown.ends_with(&unsupported_pixel_format_message("32-bit_rle_xyzw")), "{unknown}");
     for size in ["-Y 1 +Y 1", "-Y 1", "X 1 Y 1", "-Y -1 +X 1", "-Y 1 +X 1 2"] {
         assert!(load_bytes("a.hdr", &file("", size, &PIXEL), ColorEncoding::Color).is_err(), "{size}");
     }

@@ -99,9 +99,9 @@ impl<'a> LimitNormalCalculator<'a> {
 /// Cross product of the tangent along a boundary and the one across it. `is_wide` is whether the vertex has
 /// wide fans.
 ///
-/// The mask across is sin(iπ/k) for the inner neighbors i of a fan with k faces, with the eigenvalue λ = 3/8
-/// + cos(π/k)/4, or 1/2 if the fan is wide. The first and last neighbors have equal weights, which follow
-/// from the equations of the eigenvector. For k = 3, this is the mask (−2; −1, 2, 2, −1) of Hoppe et al.
+/// The mask across is sin(iπ/k) for the inner neighbors i of a fan with k faces, with the eigenvalue
+/// λ = 3/8 + cos(π/k)/4, or 1/2 if the fan is wide. The first and last neighbors have equal weights, which
+/// follow from the equations of the eigenvector. For k = 3, this is the mask (−2; −1, 2, 2, −1) of Hoppe et al.
 /// 1994. The weight of the center does not matter, because the arms start there.
 fn open_fan_normal(arms: &[DVec3], is_wide: bool) -> DVec3 {
     let faces = arms.len() - 1;
