@@ -22,7 +22,7 @@ use crate::pipeline::settings::Overrides;
 use crate::scene::diagnostic::Severity;
 
 #[test]
-#[ignore = "interactive: cargo test --release -p glimt-tui --lib manual_test -- --ignored --nocapture"]
+#[ignore = "interactive, until q: GLIMT_MANUAL_SCENE=a.toml cargo test --release -p glimt-tui --lib manual_test -- --ignored --nocapture"]
 fn interactive_session() {
     let scene = PathBuf::from(std::env::var("GLIMT_MANUAL_SCENE").unwrap_or_default());
     let (commands, orders) = channel();

@@ -186,21 +186,6 @@ impl<'a> SceneReader<'a> {
         Some(SceneDocumentValue::Table(vec![("texture", name.into())]))
     }
 
-    /// Returns the value of `opacity` for a texture. Selects the red channel if the image may have alpha,
-    /// which `opacity` would read: Mitsuba takes the luminance, and masks are gray.
-    pub(super) fn opacity_texture(
-        &mut self,
-        index: GraphObjectIndex,
-        uv: UvFlips,
-    ) -> Option<SceneDocumentValue> {
-        let name = self.find_or_add_texture(index, MitsubaTextureUse::Number, uv)?;
-        let mut entries = vec![("texture", name.into())];
-        if self.image_may_have_alpha(self.object_by_index(index)) {
-            entries.push(("channel", "r".into()));
-        }
-        Some(SceneDocumentValue::Table(entries))
-    }
-
     /// Returns the value of `roughness`, which is √α, for a texture of α.
     pub(super) fn roughness_texture(
         &mut self,
@@ -229,7 +214,7 @@ impl<'a> SceneReader<'a> {
     }
 
     /// Whether an image may have an alpha channel, from the color type of a PNG file or the file extension.
-    fn image_may_have_alpha(&mut self, object: &'a PluginInstance) -> bool {
+    pub(super) fn image_may_have_alpha(&mut self, object: &'a PluginInstance) -> bool {
         let Some((name, span)) = self.text(object, "filename") else { return false };
         let Some(path) = self.find_file(name, &span) else { return false };
         match extension(&path.to_string_lossy()).as_str() {

@@ -310,27 +310,9 @@ impl<'a> SceneReader<'a> {
 
     /// Converts a number or texture to the value of a number key.
     fn value_from_number_source(&mut self, number: NumberSource, context: BsdfContext) -> SceneDocumentValue {
-        self.value_from_number_or_texture(number, context, Self::number_texture)
-    }
-
-    /// Converts a number or texture to the value of `opacity`.
-    fn opacity_from_number_source(
-        &mut self,
-        number: NumberSource,
-        context: BsdfContext,
-    ) -> SceneDocumentValue {
-        self.value_from_number_or_texture(number, context, Self::opacity_texture)
-    }
-
-    fn value_from_number_or_texture(
-        &mut self,
-        number: NumberSource,
-        context: BsdfContext,
-        convert_texture: impl FnOnce(&mut Self, GraphObjectIndex, UvFlips) -> Option<SceneDocumentValue>,
-    ) -> SceneDocumentValue {
         match number {
             NumberSource::Constant(number) => shorten_number(number.clamp(0.0, 1.0)).into(),
-            NumberSource::Texture(texture) => match convert_texture(self, texture, context.uv) {
+            NumberSource::Texture(texture) => match self.number_texture(texture, context.uv) {
                 Some(value) => value,
                 None => {
                     let color = self.color_if_spectrum(texture, ColorRole::Reflectance);

@@ -72,7 +72,13 @@ impl<'a> SceneReader<'a> {
         let text = "light from point, spot and directional lights passes through them; Mitsuba blocks it";
         self.notes.note("masks", text, object.span.clone());
         let opacity = self.number_or_texture(object, "opacity", 0.5);
-        let value = self.opacity_from_number_source(opacity, context);
+        let mut value = self.value_from_number_source(opacity, context);
+        if let (NumberSource::Texture(texture), SceneDocumentValue::Table(entries)) = (opacity, &mut value)
+            && self.image_may_have_alpha(self.object_by_index(texture))
+        {
+            // By default, `opacity` reads alpha, and Mitsuba the luminance. Masks are gray.
+            entries.push(("channel", "r".into()));
+        }
         built.keys.push(("opacity", value));
     }
 
